@@ -1,0 +1,1 @@
+"""Continuous semantic maps by Gaussian processes."""

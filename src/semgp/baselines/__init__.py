@@ -1,0 +1,1 @@
+"""The rivals: simple maps that are hard to beat."""

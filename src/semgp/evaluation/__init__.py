@@ -1,0 +1,1 @@
+"""Metrics, experiments, tables and figures."""

@@ -1,0 +1,1 @@
+"""Maps: thin, stateful, one protocol for all."""

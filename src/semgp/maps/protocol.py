@@ -1,0 +1,86 @@
+"""What every map is: updated with clouds, queried at points, saved as plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol, Self, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgp.classes import Classes
+from semgp.cloud import LabelledCloud
+from semgp.errors import InputError
+from semgp.prediction import Prediction
+
+
+@runtime_checkable
+class SemanticMap(Protocol):
+    """A semantic map: the GP map, the OctoMap and the baselines alike."""
+
+    kind: str
+    """Name of the method in map files and on the command line, such as "gp" or "knn"."""
+
+    classes: Classes
+
+    def update(self, cloud: LabelledCloud) -> None:
+        """Take in a cloud, once for every scan. Never changes the map's settings."""
+        ...
+
+    def query(self, points: ArrayLike) -> Prediction:
+        """Answer at points (M, 3), metres, world frame. The map must have been updated at least once."""
+        ...
+
+    def __len__(self) -> int:
+        """Return the number of stored elements: training points, sites or voxels."""
+        ...
+
+    def info(self) -> dict[str, Any]:
+        """Return settings, counts and memory figures, ready for JSON."""
+        ...
+
+    def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """Return a header ready for JSON and plain arrays from which `from_arrays` makes the same map."""
+        ...
+
+    @classmethod
+    def from_arrays(
+        cls, classes: Classes, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]
+    ) -> Self:
+        """Make the map again from what `to_arrays` gave."""
+        ...
+
+
+def training_part(cloud: LabelledCloud, classes: Classes) -> LabelledCloud:
+    """Return the labelled points of a cloud, checked against a map's classes.
+
+    Raises
+    ------
+    InputError
+        Classes that differ from the map's.
+    """
+    if cloud.classes.names != classes.names:
+        raise InputError(
+            f"the cloud's classes ({', '.join(cloud.classes.names)}) are not the map's "
+            f"({', '.join(classes.names)}): give the cloud the map's classes."
+        )
+    return cloud[cloud.labelled]
+
+
+def query_points(points: ArrayLike) -> NDArray[np.float64]:
+    """Check query points and return them as float64, shape (M, 3).
+
+    Raises
+    ------
+    InputError
+        Wrong shape, or NaN or infinite coordinates.
+    """
+    X = np.ascontiguousarray(points, dtype=np.float64)
+    if X.ndim != 2 or X.shape[1] != 3:
+        raise InputError(f"query points must have shape (M, 3), not {X.shape}.")
+    finite = np.isfinite(X).all(axis=1)
+    if not finite.all():
+        raise InputError(
+            f"{np.count_nonzero(~finite)} of {len(X)} query points are NaN or infinite: drop them."
+        )
+    return X

@@ -1,0 +1,34 @@
+"""Spread blocks of work over threads, one BLAS thread each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from threadpoolctl import threadpool_limits
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def n_workers() -> int:
+    """Return the number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def parallel_map(work: Callable[[T], R], items: Iterable[T], workers: int | None = None) -> list[R]:
+    """Return `[work(item) for item in items]`, computed by threads with one BLAS thread each.
+
+    The work must release the interpreter lock where it spends its time (numpy, BLAS, `nogil` numba). More
+    BLAS threads than workers would fight for the same cores.
+    """
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(workers or n_workers()) as pool:
+        return list(pool.map(work, items))
+
+
+def slices(n: int, size: int) -> Iterator[slice]:
+    """Yield slices of at most `size` that cover `range(n)` in order."""
+    for start in range(0, n, size):
+        yield slice(start, min(start + size, n))
