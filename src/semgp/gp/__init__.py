@@ -1,1 +1,1 @@
-"""Gaussian-process classification as pure functions on arrays, in the symbols of the paper and of Rasmussen & Williams."""
+"""Gaussian-process classification: pure functions in the symbols of Rasmussen & Williams."""
