@@ -1,0 +1,182 @@
+"""FITC: the covariance of n points through m inducing points, K ~ Q + diag(K - Q), Q = K_fu K_uu^-1 K_uf.
+
+Snelson & Ghahramani 2006; Naish-Guzman & Holden 2007 for classification. With K_uu = L L' and V = L^-1 K_uf
+the covariance is V'V + D, D = diag(K - V'V), and every n x n matrix reduces to S = I + V T V' (m x m) with
+T = diag(W / (1 + D W)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from semgp.errors import InputError
+from semgp.gp.covariance import Term
+from semgp.gp.fitc_predictor import FITCPredictor
+from semgp.gp.kernels import Array, Kernel, checked_inputs
+from semgp.parallel import n_workers, parallel_map, slices
+
+ROUNDING = 1e-17
+"""A column of V whose share in S is below this beside the identity cannot change S in double precision."""
+COLUMNS = 1000
+"""Training points a block of the gradient."""
+
+
+class FITCCovariance:
+    """The FITC approximation of the covariance matrix.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Covariance function.
+    X : (n, D) array
+        Training inputs.
+    U : (m, D) array
+        Inducing inputs.
+    jitter : float, optional
+        Added to the diagonal of K_uu, relative to its mean.
+    absolute_jitter : bool, optional
+        Take the jitter as it is, not relative to the diagonal.
+
+    Raises
+    ------
+    InputError
+        Inputs that are not finite or do not agree, or a K_uu that is not positive definite.
+    """
+
+    def __init__(
+        self, kernel: Kernel, X: Array, U: Array, jitter: float = 1e-6, absolute_jitter: bool = False
+    ) -> None:
+        self.kernel = kernel
+        self.X, self.U = checked_inputs(X), checked_inputs(U)
+        if self.X.shape[1] != self.U.shape[1]:
+            raise InputError(f"inputs have {self.X.shape[1]} dimensions, inducing inputs {self.U.shape[1]}.")
+        self.n = len(self.X)
+        self.jitter, self.absolute_jitter = jitter, absolute_jitter
+        K_uu = kernel(self.U, self.U)
+        K_uu[np.diag_indices(len(self.U))] += jitter * (1 if absolute_jitter else kernel.diag(self.U).mean())
+        try:
+            self.L = cholesky(K_uu, lower=True, check_finite=False)
+        except np.linalg.LinAlgError as error:
+            raise InputError(
+                "the covariance of the inducing points is not positive definite: raise the jitter, or remove "
+                "inducing points that lie on top of each other."
+            ) from error
+        blocks = list(slices(self.n, -(-self.n // n_workers())))
+        self.V = np.hstack(parallel_map(self._whitened, blocks))
+        self.D = kernel.diag(self.X) - np.einsum("mn,mn->n", self.V, self.V)
+
+    def _whitened(self, block: slice) -> Array:
+        K_uf = self.kernel(self.U, self.X[block])
+        return np.asarray(solve_triangular(self.L, K_uf, lower=True, check_finite=False, overwrite_b=True))
+
+    def matvec(self, v: Array) -> Array:
+        """Return K v for v (n,)."""
+        return np.asarray((self.V @ v) @ self.V + self.D * v)
+
+    def factorise(self, W: Array) -> FITCFactor:
+        """Factorise K together with curvatures W (n,)."""
+        T = W / (1 + self.D * W)
+        # Saturated points (W ~ 0) are most of a class; leaving them out changes nothing and saves the time.
+        share = T * (self.kernel.diag(self.X) - self.D)
+        matter = np.flatnonzero(share > ROUNDING)
+        V = self.V * np.sqrt(T) if len(matter) == self.n else self.V[:, matter] * np.sqrt(T[matter])
+        S = V @ V.T
+        S[np.diag_indices(len(S))] += 1
+        return FITCFactor(self.V, self.D, W, T, np.linalg.cholesky(S))
+
+    def gradient(self, terms: Sequence[Term[FITCFactor]]) -> Array:
+        """Return the sum over the terms of tr(G dK / dtheta), shape (P,).
+
+        dK = dQ + diag(dK - dQ), so with G0 = G - diag(G) and P = K_uu^-1 K_uf the sum is
+        2 tr(G0 P' dK_uf) - tr(P G0 P' dK_uu) + sum_i G_ii dk_ii. M collects L' P G0, which S keeps cheap:
+        V R = S^-1 V T.
+        """
+        A = np.column_stack([term.a for term in terms])
+        U = np.column_stack([term.u for term in terms])
+        g = np.zeros(self.n)
+        for term in terms:
+            g += term.factor.R_diagonal() / 2 + term.a * (term.u - term.a / 2)
+        VA, VU = self.V @ A, self.V @ U
+        M = np.empty_like(self.V)
+
+        def collect(block: slice) -> None:
+            part = (VU - VA) @ A[block].T / 2 + VA @ U[block].T / 2 - self.V[:, block] * g[block]
+            for term in terms:
+                part += term.factor.S_inverse_V[:, block] * (term.factor.T[block] / 2)
+            M[:, block] = part
+
+        parallel_map(collect, slices(self.n, COLUMNS))
+        H = solve_triangular(self.L, M, lower=True, trans=1, check_finite=False)
+        HP = solve_triangular(self.L, (H @ self.V.T).T, lower=True, trans=1, check_finite=False)
+        parts = parallel_map(
+            lambda block: self.kernel.contract(self.U, self.X[block], H[:, block]), slices(self.n, COLUMNS)
+        )
+        gradient = 2 * np.sum(parts, axis=0) - self.kernel.contract(self.U, self.U, HP)
+        if not self.absolute_jitter:
+            mean_weight = np.full(len(self.U), self.jitter * np.trace(HP) / len(self.U))
+            gradient -= self.kernel.contract_diag(self.U, mean_weight)
+        return np.asarray(gradient + self.kernel.contract_diag(self.X, g))
+
+    def predictor(self, terms: Sequence[Term[FITCFactor]]) -> FITCPredictor:
+        """Return what predicts for the posteriors of the terms."""
+        A = np.column_stack([term.a for term in terms])
+        beta = solve_triangular(self.L, self.V @ A, lower=True, trans=1)
+        roots = np.stack([_inverse(term.factor.L).T for term in terms], axis=1)
+        return FITCPredictor(self.kernel, self.U, _inverse(self.L).T, beta, roots.astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class FITCFactor:
+    """L L' = S = I + V T V', T = W / (1 + D W)."""
+
+    V: Array
+    D: Array
+    W: Array
+    T: Array
+    L: Array
+
+    @property
+    def log_det_B(self) -> float:
+        """log |B| = log |S| + log |I + D W|."""
+        return float(2 * np.log(np.diag(self.L)).sum() + np.log1p(self.D * self.W).sum())
+
+    @cached_property
+    def S_inverse_V(self) -> Array:
+        """S^-1 V (m, n)."""
+        L_inverse = _inverse(self.L)
+        return np.asarray((L_inverse.T @ L_inverse) @ self.V)
+
+    @cached_property
+    def _v_S_inverse_v(self) -> Array:
+        """v' S^-1 v for each column v of V, shape (n,)."""
+        return np.asarray(np.einsum("mn,mn->n", self.V, self.S_inverse_V))
+
+    def solve(self, v: Array) -> Array:
+        """Return R v = T v - T V' S^-1 V T v for v (n,)."""
+        Tv = self.T * v
+        half = solve_triangular(self.L, self.V @ Tv, lower=True, check_finite=False)
+        return np.asarray(
+            Tv - self.T * (solve_triangular(self.L, half, lower=True, trans=1, check_finite=False) @ self.V)
+        )
+
+    def R_diagonal(self) -> Array:
+        """Return the diagonal (n,) of R."""
+        return self.T - self.T**2 * self._v_S_inverse_v
+
+    def marginal_variance(self) -> Array:
+        """Return the diagonal (n,) of (K^-1 + W)^-1.
+
+        Given the inducing values, f_i has variance D / (1 + D W); their posterior adds the rest.
+        """
+        shrink = 1 / (1 + self.D * self.W)
+        return shrink * self.D + shrink**2 * self._v_S_inverse_v
+
+
+def _inverse(L: Array) -> Array:
+    """Return the inverse of a lower-triangular matrix."""
+    return np.asarray(solve_triangular(L, np.eye(len(L)), lower=True, check_finite=False))
