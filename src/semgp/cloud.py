@@ -90,7 +90,7 @@ class LabelledCloud:
     def __len__(self) -> int:
         return len(self.points)
 
-    def __getitem__(self, keep: ArrayLike) -> LabelledCloud:
+    def __getitem__(self, keep: slice | NDArray[Any]) -> LabelledCloud:
         """Return the cloud of the points that a mask, slice or index array selects."""
 
         def pick(a: Any) -> Any:
@@ -98,7 +98,7 @@ class LabelledCloud:
 
         return replace(
             self,
-            points=self.points[keep],  # type: ignore[index]
+            points=self.points[keep],
             labels=pick(self.labels),
             weights=pick(self.weights),
             colours=pick(self.colours),
@@ -125,6 +125,16 @@ class LabelledCloud:
         return np.where(self.labelled, self.weights.argmax(axis=1), MISSING).astype(np.int32)
 
     @property
+    def class_weights(self) -> NDArray[np.float32]:
+        """Class weights (N, C): the soft labels, or one in the column of the hard label; zeros where missing."""
+        if self.weights is not None:
+            return self.weights
+        w = np.zeros((len(self), len(self.classes)), dtype=np.float32)
+        rows = np.flatnonzero(self.labelled)
+        w[rows, self.hard_labels[rows]] = 1
+        return w
+
+    @property
     def origin(self) -> NDArray[np.float64] | None:
         """Position (3,) of the sensor in the world, or None where the pose is not known."""
         return None if self.T_world_sensor is None else self.T_world_sensor[:3, 3]
@@ -148,9 +158,7 @@ def rigid_transform(name: str, T: ArrayLike) -> NDArray[np.float64]:
         or np.linalg.det(R) < 0
         or not np.allclose(T[3], (0, 0, 0, 1))
     ):
-        raise InputError(
-            f"{name} is no rigid transform: its last row must be 0 0 0 1, its 3 x 3 part a rotation."
-        )
+        raise InputError(f"{name} is no rigid transform: its last row must be 0 0 0 1, its 3 x 3 part a rotation.")
     return T
 
 
@@ -164,14 +172,12 @@ def _array(name: str, a: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
 def _rows(name: str, a: ArrayLike, n: int, width: int | None, dtype: type[np.generic]) -> NDArray[Any]:
     a = _array(name, a, dtype)
     if a.ndim != 2 or len(a) != n or (width is not None and a.shape[1] != width):
-        raise InputError(
-            f"{name} must have shape ({n}, {width or 'F'}) to go with {n} points, not {a.shape}."
-        )
+        raise InputError(f"{name} must have shape ({n}, {width or 'F'}) to go with {n} points, not {a.shape}.")
     return a
 
 
 def _require_finite(name: str, a: NDArray[Any]) -> None:
-    finite = np.isfinite(a).reshape(len(a), -1).all(axis=1)
+    finite = np.isfinite(a).all(axis=tuple(range(1, a.ndim)))
     if not finite.all():
         raise InputError(
             f"{name} has NaN or infinite values in {np.count_nonzero(~finite)} of {len(a)} rows, "

@@ -74,7 +74,7 @@ def laplace(
     likelihood : Likelihood
         p(y | f).
     y : (n,) array
-        Labels, +1 or -1.
+        Targets: +1 or -1, or between for soft labels.
     m : float
         Constant prior mean.
     a : (n,) array, optional
@@ -100,6 +100,9 @@ def laplace(
         a = a + length * step
         Ka = Ka + length * K_step
         iterations += 1
+    # once more from `a` alone, so that a stored mode gives the same posterior to the last bit
+    Ka = K.matvec(a)
+    d = likelihood.derivatives(y, Ka + m)
     factor = K.factorise(-d.d2)
     nlml = 0.5 * float(a @ Ka) - float(d.log_p.sum()) + 0.5 * factor.log_det_B
     return Laplace(nlml, a, factor, d, converged, iterations)

@@ -1,8 +1,11 @@
 """Compiled log-likelihoods and derivatives, exact to rounding in both tails.
 
-In the far lower tail, x = -y f > 5, Phi(-x) / N(x) is Mills' ratio, whose continued fraction
+In the far lower tail, x = -z > 5, Phi(-x) / N(x) is Mills' ratio, whose continued fraction
 1 / (x + 1 / (x + 2 / (x + 3 / ...))) gives each derivative as a product without cancellation
 (Abramowitz & Stegun, 26.2.14). The textbook form n (n + z), n = N(z) / Phi(z), loses all digits there.
+
+A target y = +1 or -1 is a label; one between is a soft label, of probability (1 + y) / 2 for +1, and the
+log-likelihood is the mean of both labels'.
 """
 
 import math
@@ -20,50 +23,70 @@ _TERMS = 60
 
 
 @njit(cache=True, nogil=True)
+def _log_ndtr(z: float) -> tuple[float, float, float, float]:
+    """Return log Phi(z) and its first three derivatives."""
+    if z > -_TAIL:
+        p = 0.5 * math.erfc(-z * _SQRT_HALF)
+        # log1p keeps the digits of log p where p is close to one
+        log_p = math.log(p) if z < 1 else math.log1p(-0.5 * math.erfc(z * _SQRT_HALF))
+        n = _INV_SQRT_2PI * math.exp(-0.5 * z * z) / p
+        c = n + z
+        return log_p, n, -n * c, n * (c * c + n * c - 1)
+    x = -z
+    h = 0.0
+    for k in range(_TERMS, 3, -1):
+        h = k / (x + h)
+    g = 3 / (x + h)
+    e = 2 / (x + g)
+    c = 1 / (x + e)
+    n = x + c
+    # c^2 + n c - 1 = c (2 c - e) and 2 c - e = 2 c (g - e) / (x + g), g - e = (x + 3 g - 2 h) / ((x + h) (x + g))
+    third = 2 * n * c * c * (x + 3 * g - 2 * h) / ((x + h) * (x + g) * (x + g))
+    return -0.5 * x * x - _LOG_SQRT_2PI - math.log(n), n, -n * c, third
+
+
+@njit(cache=True, nogil=True)
+def _log_expit(z: float) -> tuple[float, float, float, float]:
+    """Return log 1 / (1 + exp(-z)) and its first three derivatives."""
+    e = math.exp(-abs(z))
+    small, large = e / (1 + e), 1 / (1 + e)
+    third = small * large * (1 - e) / (1 + e)
+    if z > 0:
+        return -math.log1p(e), small, -small * large, third
+    return z - math.log1p(e), large, -small * large, -third
+
+
+@njit(cache=True, nogil=True)
 def probit_derivatives(y: Array, f: Array) -> tuple[Array, Array, Array, Array]:
-    """Return log Phi(y f) and its first three derivatives in f."""
+    """Return log p(y | f) = log Phi(y f) and its first three derivatives in f."""
     n = len(f)
     log_p, d1, d2, d3 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        z = y[i] * f[i]
-        if z > -_TAIL:
-            p = 0.5 * math.erfc(-z * _SQRT_HALF)
-            # log1p keeps the digits of log p where p is close to one
-            log_p[i] = math.log(p) if z < 1 else math.log1p(-0.5 * math.erfc(z * _SQRT_HALF))
-            ratio = _INV_SQRT_2PI * math.exp(-0.5 * z * z) / p
-            c = ratio + z
-            d1[i] = y[i] * ratio
-            d2[i] = -ratio * c
-            d3[i] = y[i] * ratio * (c * c + ratio * c - 1)
-        else:
-            x = -z
-            h = 0.0
-            for k in range(_TERMS, 3, -1):
-                h = k / (x + h)
-            g = 3 / (x + h)
-            e = 2 / (x + g)
-            c = 1 / (x + e)
-            ratio = x + c
-            log_p[i] = -0.5 * x * x - _LOG_SQRT_2PI - math.log(ratio)
-            d1[i] = y[i] * ratio
-            d2[i] = -ratio * c
-            # c^2 + ratio c - 1 = c (2 c - e), and 2 c - e = 2 (g - e) / ((x + e) (x + g))
-            g_minus_e = (x + 3 * g - 2 * h) / ((x + h) * (x + g))
-            d3[i] = y[i] * ratio * c * 2 * g_minus_e * c / (x + g)
+        sign = 1.0 if y[i] >= 0 else -1.0
+        l, a, b, c = _log_ndtr(sign * f[i])
+        log_p[i], d1[i], d2[i], d3[i] = l, sign * a, b, sign * c
+        other = 0.5 * (1 - abs(y[i]))
+        if other > 0:
+            l, a, b, c = _log_ndtr(-sign * f[i])
+            log_p[i] += other * (l - log_p[i])
+            d1[i] += other * (-sign * a - d1[i])
+            d2[i] += other * (b - d2[i])
+            d3[i] += other * (-sign * c - d3[i])
     return log_p, d1, d2, d3
 
 
 @njit(cache=True, nogil=True)
 def logistic_derivatives(y: Array, f: Array) -> tuple[Array, Array, Array, Array]:
-    """Return log 1 / (1 + exp(-y f)) and its first three derivatives in f."""
+    """Return log p(y | f) = log 1 / (1 + exp(-y f)) and its first three derivatives in f."""
     n = len(f)
     log_p, d1, d2, d3 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
-        z = y[i] * f[i]
-        e = math.exp(-abs(z))
-        log_p[i] = min(z, 0.0) - math.log1p(e)
-        small, large = e / (1 + e), 1 / (1 + e)
-        d1[i] = y[i] * (small if z > 0 else large)
-        d2[i] = -small * large
-        d3[i] = -small * large * (1 - e) / (1 + e) * (-1.0 if f[i] > 0 else 1.0)
+        sign = 1.0 if y[i] >= 0 else -1.0
+        l, a, b, c = _log_expit(sign * f[i])
+        log_p[i], d1[i], d2[i], d3[i] = l, sign * a, b, sign * c
+        other = 0.5 * (1 - abs(y[i]))
+        if other > 0:
+            # log p(-f) = log p(f) - f: only the first two terms differ
+            log_p[i] -= other * sign * f[i]
+            d1[i] -= other * sign
     return log_p, d1, d2, d3

@@ -25,7 +25,7 @@ class Derivatives(NamedTuple):
 
 
 class Likelihood(Protocol):
-    """p(y | f) for labels y of +1 and -1; log-concave in f."""
+    """p(y | f), log-concave in f, for targets y of +1 and -1; one between is a soft label."""
 
     name: str
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from semgp.errors import InputError
 from semgp.gp.covariance import Covariance, F, Term
@@ -19,21 +18,18 @@ from semgp.gp.likelihoods import Likelihood
 from semgp.parallel import parallel_map
 
 
-def binary_targets(labels: ArrayLike, classes: ArrayLike) -> Array:
-    """Return targets (n, C): +1 where the label is the class of the column, -1 elsewhere.
+def binary_targets(weights: Array) -> Array:
+    """Return targets (n, C) from class weights (n, C): 2 w - 1, +1 and -1 where a label is certain.
 
     Raises
     ------
     InputError
-        A class without a single label, or a label that is none of the classes.
+        Negative weights, or a point or class without any.
     """
-    labels, classes = np.asarray(labels), np.asarray(classes)
-    is_class = labels[:, None] == classes
-    if not is_class.any(axis=1).all():
-        raise InputError("some labels are none of the classes: drop missing labels before training.")
-    if not is_class.any(axis=0).all():
-        raise InputError("some classes have no training point: leave them out.")
-    return np.where(is_class, 1.0, -1.0)
+    total = weights.sum(axis=1, keepdims=True)
+    if (weights < 0).any() or not (total > 0).all() or not (weights.sum(axis=0) > 0).all():
+        raise InputError("every training point and every class needs a positive weight: drop missing labels.")
+    return np.asarray(2 * (weights / total) - 1)
 
 
 def class_posteriors(
@@ -48,7 +44,7 @@ def class_posteriors(
     likelihood : Likelihood
         p(y | f).
     Y : (n, C) array
-        Targets, +1 or -1.
+        Targets: +1 or -1, or between for soft labels.
     m : (C,) array
         Prior mean of each class.
     starts : sequence of (n,) arrays, optional
@@ -66,9 +62,3 @@ def nlml_gradient(K: Covariance[F], posteriors: Sequence[Laplace[F]]) -> tuple[A
     """Return the gradient of the summed NLML in theta (P,) and in each class's mean (C,), and the terms."""
     terms = parallel_map(lambda posterior: posterior.term(K), posteriors)
     return K.gradient(terms), np.array([gradient_in_mean(term) for term in terms]), terms
-
-
-def normalise(scores: Array) -> NDArray[np.float64]:
-    """Return class scores (M, C), non-negative, over their sum; uniform where all of them are zero."""
-    total = scores.sum(axis=1, keepdims=True)
-    return np.asarray(np.divide(scores, total, out=np.full_like(scores, 1 / scores.shape[1]), where=total > 0))

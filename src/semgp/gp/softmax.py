@@ -101,10 +101,20 @@ def softmax_laplace(
         a = a + length * step
         f = f + length * K_step
         iterations += 1
-    pi = softmax(f, axis=0)
-    E, L, log_det = _factorise(K, pi)
+    f = _apply(K, a) + m[:, None]
+    E, L, log_det = _factorise(K, softmax(f, axis=0))
     nlml = 0.5 * np.vdot(a, f - m[:, None]) - np.vdot(y, log_softmax(f, axis=0)) + 0.5 * log_det
-    return SoftmaxLaplace(tuple(kernels), X, m, float(nlml), a, pi, E, L, converged, iterations)
+    return SoftmaxLaplace(tuple(kernels), X, m, float(nlml), a, softmax(f, axis=0), E, L, converged, iterations)
+
+
+def softmax_at(
+    kernels: Sequence[Kernel], X: Array, m: Array, a: Array, nlml: float, converged: bool
+) -> SoftmaxLaplace:
+    """Return the posterior again from a mode `a` (C, n) found before."""
+    K = np.stack([kernel(X, X) for kernel in kernels])
+    pi = softmax(_apply(K, a) + m[:, None], axis=0)
+    E, L, _ = _factorise(K, pi)
+    return SoftmaxLaplace(tuple(kernels), X, m, nlml, a, pi, E, L, converged, 0)
 
 
 def _apply(K: Array, v: Array) -> Array:

@@ -44,9 +44,7 @@ class SemanticMap(Protocol):
         ...
 
     @classmethod
-    def from_arrays(
-        cls, classes: Classes, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]
-    ) -> Self:
+    def from_arrays(cls, classes: Classes, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
         """Make the map again from what `to_arrays` gave."""
         ...
 
@@ -80,7 +78,5 @@ def query_points(points: ArrayLike) -> NDArray[np.float64]:
         raise InputError(f"query points must have shape (M, 3), not {X.shape}.")
     finite = np.isfinite(X).all(axis=1)
     if not finite.all():
-        raise InputError(
-            f"{np.count_nonzero(~finite)} of {len(X)} query points are NaN or infinite: drop them."
-        )
+        raise InputError(f"{np.count_nonzero(~finite)} of {len(X)} query points are NaN or infinite: drop them.")
     return X

@@ -1,0 +1,56 @@
+"""How often the labels are right: accuracy and intersection over union."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgp.classes import MISSING
+from semgp.errors import InputError
+from semgp.evaluation.checks import true_labels
+
+
+def confusion(label: ArrayLike, truth: ArrayLike, n_classes: int) -> NDArray[np.int64]:
+    """Count the points (C, C + 1) by true class (row) and given class (column).
+
+    Parameters
+    ----------
+    label : (N,) integer array
+        Labels given; `MISSING`, an answer withheld, goes to the last column.
+    truth : (N,) integer array
+        True labels; points without one (`MISSING`) are left out.
+    n_classes : int
+        Number of classes C.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not agree, or labels out of range.
+    """
+    given = np.asarray(label)
+    if given.ndim != 1 or (len(given) and given.dtype.kind not in "iu"):
+        raise InputError(f"labels must be whole numbers of shape (N,), not {given.dtype} of {given.shape}.")
+    if len(given) and (given.min() < MISSING or given.max() >= n_classes):
+        raise InputError(f"labels go from {given.min()} to {given.max()}, not from {MISSING} to {n_classes - 1}.")
+    y = true_labels(truth, len(given), n_classes)
+    known = y != MISSING
+    column = np.where(given == MISSING, n_classes, given)
+    flat = np.bincount((y * (n_classes + 1) + column)[known], minlength=n_classes * (n_classes + 1))
+    return flat.reshape(n_classes, n_classes + 1)
+
+
+def accuracy(confusion: NDArray[np.int64]) -> float:
+    """Return the share of points whose label is right; NaN without points. An answer withheld is wrong."""
+    n = confusion.sum()
+    return float(confusion.diagonal().sum() / n) if n else float("nan")
+
+
+def iou(confusion: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the intersection over union (C,) of each class; NaN for classes absent from the truth.
+
+    An answer withheld misses its true class and is no false alarm for another.
+    """
+    hit = confusion.diagonal()
+    present = confusion.sum(axis=1) > 0
+    union = confusion.sum(axis=1) + confusion[:, :-1].sum(axis=0) - hit
+    return np.asarray(np.divide(hit, union, out=np.full(len(hit), np.nan), where=present))

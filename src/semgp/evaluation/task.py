@@ -1,0 +1,111 @@
+"""A task: labels to build a map from, points to ask it about, and the truth to score it by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgp.classes import MISSING
+from semgp.cloud import LabelledCloud
+from semgp.evaluation.measure import peak_memory_mb, reset_peak_memory, timed
+from semgp.evaluation.scores import Scores, score
+from semgp.maps.protocol import SemanticMap
+from semgp.prediction import Prediction
+from semgp.sampling import random_subset
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One scene of an experiment.
+
+    Parameters
+    ----------
+    name : str
+        Frame number, or what else tells the scene apart.
+    experiment : str
+        Which labels the map is built from.
+    training : tuple of LabelledCloud
+        Scans with the labels that a map may use.
+    truth : LabelledCloud
+        Query points with their true labels.
+    n_small : int
+        Points of the small training set, for methods that cannot take them all.
+    seed : int
+        Seed of that set and of all that the methods draw.
+    """
+
+    name: str
+    experiment: str
+    training: tuple[LabelledCloud, ...]
+    truth: LabelledCloud
+    n_small: int = 5000
+    seed: int = 0
+
+    @cached_property
+    def small(self) -> LabelledCloud:
+        """At most `n_small` labelled points of the first scan, drawn with the seed."""
+        labelled = self.training[0][self.training[0].labelled]
+        return labelled[random_subset(labelled, self.n_small, self.seed)]
+
+
+@dataclass(frozen=True)
+class Built:
+    """A map that is up to date, and the number of labelled points that it was built from."""
+
+    semantic_map: SemanticMap
+    n_train: int
+
+
+Method = Callable[[Task], Built]
+"""Builds a method's map for a task."""
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One method's answer to one task: a row of the table, and what figures are made of."""
+
+    frame: str
+    method: str
+    experiment: str
+    scores: Scores
+    prediction: Prediction
+    n_train: int
+    fit_seconds: float
+    query_seconds: float
+    peak_rss_mb: float
+
+    def row(self) -> dict[str, Any]:
+        """Return the row, ready for JSON; all scores are fractions from 0 to 1 but the NLL, in nats."""
+        s = self.scores
+        return {
+            "frame": self.frame,
+            "method": self.method,
+            "experiment": self.experiment,
+            **{"auc": s.auc_total, "accuracy": s.accuracy, "miou": s.miou, "nll": s.nll, "ece": s.ece},
+            "coverage": s.coverage,
+            "n_train": self.n_train,
+            "n_query": s.n_points,
+            "n_classes": int(np.isfinite(s.auc).sum()),
+            "fit_seconds": round(self.fit_seconds, 3),
+            "query_seconds": round(self.query_seconds, 3),
+            "peak_rss_mb": round(self.peak_rss_mb, 1),
+            "scores": s.to_json(),
+        }
+
+
+def run(task: Task, name: str, method: Method) -> Result:
+    """Build a method's map, query it at every truly labelled point, and score it."""
+    truth = task.truth[task.truth.hard_labels != MISSING]
+    reset_peak_memory()
+    built, fit_seconds = timed(lambda: method(task))
+    prediction, query_seconds = timed(lambda: built.semantic_map.query(truth.points))
+    peak = peak_memory_mb()
+    scores = score(prediction.probability, prediction.observed, truth.hard_labels)
+    return Result(
+        task.name, name, task.experiment, scores, prediction, built.n_train, fit_seconds, query_seconds, peak
+    )

@@ -1,0 +1,75 @@
+"""Map files: any map as one npz file of plain arrays and a JSON header. Nothing in it is ever executed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from semgp.classes import Classes
+from semgp.errors import FileFormatError, InputError
+from semgp.maps.kinds import MAP_KINDS
+from semgp.maps.protocol import SemanticMap
+from semgp.readers.npz import read_arrays
+from semgp.writers import atomic_write
+
+FORMAT = "semgp-map"
+VERSION = 1
+
+
+def save_map(semantic_map: SemanticMap, path: str | Path) -> None:
+    """Write a map to a file, whole or not at all.
+
+    Parameters
+    ----------
+    semantic_map : SemanticMap
+        Any map.
+    path : str or Path
+        The file, by custom `*.semgp`; replaced where it exists.
+    """
+    header, arrays = semantic_map.to_arrays()
+    classes = semantic_map.classes
+    described: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "kind": semantic_map.kind,
+        "classes": {"names": classes.names, "colours": classes.colours},
+        "map": header,
+    }
+    text = np.frombuffer(json.dumps(described).encode(), dtype=np.uint8)
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, header=text, **{f"map.{name}": array for name, array in arrays.items()})
+
+
+def load_map(path: str | Path) -> SemanticMap:
+    """Read a map from a file that `save_map` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        A file that is missing, damaged, no map of semgp, or written by a newer version.
+    """
+    path = Path(path)
+    arrays = read_arrays(path)
+    if "header" not in arrays:
+        raise FileFormatError(path, "is no map of semgp: it has no header. `semgp build` writes maps.")
+    try:
+        described = json.loads(arrays["header"].tobytes())
+        if described["format"] != FORMAT:
+            raise FileFormatError(path, f"is no map of semgp: its format is {described['format']!r}.")
+        if described["version"] > VERSION:
+            raise FileFormatError(
+                path, f"was written by a newer semgp (format {described['version']}): upgrade semgp to read it."
+            )
+        if described["kind"] not in MAP_KINDS:
+            raise FileFormatError(path, f"holds a map of the unknown kind {described['kind']!r}.")
+        plain = described["classes"]
+        classes = Classes(tuple(plain["names"]), tuple(tuple(colour) for colour in plain["colours"]))
+        parts = {name.removeprefix("map."): a for name, a in arrays.items() if name.startswith("map.")}
+        return MAP_KINDS[described["kind"]].from_arrays(classes, described["map"], parts)
+    except FileFormatError:
+        raise
+    except (InputError, ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise FileFormatError(path, f"is damaged: {type(error).__name__}: {error}") from error
