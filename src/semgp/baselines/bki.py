@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.baselines.common import class_mass, require_data, require_positive, stored_setting
+from semgp.baselines.common import require_data, require_positive, stored_setting
 from semgp.baselines.smoothing import spread
 from semgp.baselines.voxels import VoxelMass
 from semgp.classes import Classes
@@ -90,7 +90,7 @@ class BKIMap:
         part = training_part(cloud, self.classes)
         keys = self._voxels.keys(part.points)
         order = np.argsort(keys)
-        keys, mass = keys[order], class_mass(part)[order]
+        keys, mass = keys[order], part.class_weights[order]
         voxel_units = part.points[order] / self.resolution
         fraction = voxel_units - np.floor(voxel_units)
 
@@ -117,6 +117,11 @@ class BKIMap:
         mean = alpha / total
         variance = mean * (1 - mean) / (total + 1)
         return Prediction(self.classes, mean, observed, mean=mean, variance=variance)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Centres (V, 3) of the voxels, metres."""
+        return self._voxels.centres
 
     def __len__(self) -> int:
         """Return the number of voxels that a label has reached."""

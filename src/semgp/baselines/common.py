@@ -1,4 +1,4 @@
-"""What the baselines share: labels as class mass, and checks of settings and stored arrays."""
+"""What the baselines share: checks of settings and stored arrays."""
 
 from __future__ import annotations
 
@@ -9,21 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-
-
-def class_mass(cloud: LabelledCloud) -> NDArray[np.float32]:
-    """Return the labels of a cloud whose points are all labelled as class mass (N, C).
-
-    Soft labels are their own mass; a hard label is a mass of one.
-    """
-    if cloud.weights is not None:
-        return cloud.weights
-    mass = np.zeros((len(cloud), len(cloud.classes)), dtype=np.float32)
-    if cloud.labels is not None:
-        mass[np.arange(len(cloud)), cloud.labels] = 1
-    return mass
 
 
 def require_positive(name: str, value: float) -> float:

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.baselines.common import class_mass, require_data, require_positive, require_prior, stored_setting
+from semgp.baselines.common import require_data, require_positive, require_prior, stored_setting
 from semgp.baselines.voxels import VoxelMass
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
@@ -60,7 +60,7 @@ class CSMMap:
             Other classes than the map's, or points a million voxels away from the first.
         """
         part = training_part(cloud, self.classes)
-        self._voxels.add(self._voxels.keys(part.points), class_mass(part))
+        self._voxels.add(self._voxels.keys(part.points), part.class_weights)
 
     def query(self, points: ArrayLike) -> Prediction:
         """Answer at points (M, 3) with the shares of their voxels.
@@ -77,6 +77,11 @@ class CSMMap:
         count += np.float32(self.alpha0)
         count[~observed] = 1
         return Prediction(self.classes, count / count.sum(axis=1, keepdims=True), observed)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Centres (V, 3) of the voxels, metres."""
+        return self._voxels.centres
 
     def __len__(self) -> int:
         """Return the number of voxels that hold labels."""

@@ -141,6 +141,11 @@ class KNNMap:
         votes[~observed] = 1
         return votes / votes.sum(axis=1, keepdims=True), observed
 
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Stored points (N, 3), metres."""
+        return self._points
+
     def __len__(self) -> int:
         """Return the number of stored points."""
         return len(self._points)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from semgp.baselines.common import stored_array
 from semgp.errors import InputError
 from semgp.parallel import parallel_map, slices
-from semgp.voxels import VoxelTable, voxel_keys, voxel_origin
+from semgp.voxels import VoxelTable, voxel_centres, voxel_keys, voxel_origin
 
 _CHUNK = 65_536  # query points that one thread answers at a time
 
@@ -41,6 +41,11 @@ class VoxelMass:
     def n_bytes(self) -> int:
         """Bytes that keys and mass take, the hash table's slots left out."""
         return len(self) * (8 + 4 * self._mass.shape[1])
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Centres (V, 3) of the voxels, metres."""
+        return voxel_centres(self._table.keys, self.resolution, self.origin)
 
     def keys(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the voxel keys (N,) of points; the first point of all settles the origin of the keys.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgp.classes import MISSING
 from semgp.cloud import LabelledCloud
@@ -74,6 +73,7 @@ class Result:
     experiment: str
     scores: Scores
     prediction: Prediction
+    semantic_map: SemanticMap
     n_train: int
     fit_seconds: float
     query_seconds: float
@@ -107,5 +107,14 @@ def run(task: Task, name: str, method: Method) -> Result:
     peak = peak_memory_mb()
     scores = score(prediction.probability, prediction.observed, truth.hard_labels)
     return Result(
-        task.name, name, task.experiment, scores, prediction, built.n_train, fit_seconds, query_seconds, peak
+        frame=task.name,
+        method=name,
+        experiment=task.experiment,
+        scores=scores,
+        prediction=prediction,
+        semantic_map=built.semantic_map,
+        n_train=built.n_train,
+        fit_seconds=fit_seconds,
+        query_seconds=query_seconds,
+        peak_rss_mb=peak,
     )

@@ -99,6 +99,11 @@ class GPSemanticMap:
             self._training = training
         return self._training, self._expert
 
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Labelled points (N, 3), metres."""
+        return self._points
+
     def __len__(self) -> int:
         return len(self._points)
 
@@ -110,7 +115,7 @@ class GPSemanticMap:
             known["training_points"] = len(self._training.X)
             known["classes_present"] = [names[c] for c in self._training.present]
             known["nlml"], known["converged"] = self._expert.nlml, self._expert.converged
-        known["bytes"] = self._points.nbytes + self._weights.nbytes
+        known["memory_bytes"] = self._points.nbytes + self._weights.nbytes
         return {"kind": self.kind, "classes": list(names), "model": self.model.to_json(), **known}
 
     def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

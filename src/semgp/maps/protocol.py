@@ -31,6 +31,11 @@ class SemanticMap(Protocol):
         """Answer at points (M, 3), metres, world frame. The map must have been updated at least once."""
         ...
 
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Where the map has data, (n, 3), metres, world frame: points, sites or voxel centres."""
+        ...
+
     def __len__(self) -> int:
         """Return the number of stored elements: training points, sites or voxels."""
         ...

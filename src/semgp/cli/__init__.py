@@ -1,0 +1,5 @@
+"""The command line: no logic, only words and pictures around the library."""
+
+from semgp.cli.app import main
+
+__all__ = ["main"]
