@@ -43,9 +43,7 @@ class Classes:
             raise InputError(f"class names must differ, but {', '.join(twice)} occurs more than once.")
         colours = self.colours or tuple(_spread_colour(i) for i in range(len(self.names)))
         if len(colours) != len(self.names):
-            raise InputError(
-                f"{len(self.names)} class names but {len(colours)} colours: give one colour a class."
-            )
+            raise InputError(f"{len(self.names)} class names but {len(colours)} colours: give one colour a class.")
         if any(len(colour) != 3 or not all(0 <= v <= 255 for v in colour) for colour in colours):
             raise InputError("a class colour is three whole numbers from 0 to 255: red, green, blue.")
         object.__setattr__(self, "colours", tuple((int(r), int(g), int(b)) for r, g, b in colours))

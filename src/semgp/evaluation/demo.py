@@ -24,7 +24,7 @@ from semgp.picture.view import view_of
 from semgp.prediction import Prediction
 from semgp.scene.scan import SyntheticScan, synthetic_room
 
-MODEL = GPModel(max_points=3000, n_inducing=200)
+MODEL = GPModel(max_points=3000, n_inducing=150, inducing="farthest")
 """Smaller than the paper's, to stay quick."""
 BOUNDS = Bounds(ell=(0.05, 5), sf=(0.1, 10))
 
@@ -51,7 +51,7 @@ def _of_all(semantic_map: SemanticMap, task: Task) -> Built:
 METHODS: Mapping[str, Method] = {
     "GP map": _gp,
     "k-NN": lambda task: _of_all(KNNMap(task.truth.classes), task),
-    "OctoMap": lambda task: _of_all(SemanticOctoMap(task.truth.classes), task),
+    "OctoMap": lambda task: _of_all(SemanticOctoMap(task.truth.classes, resolution=0.1), task),
     "BKI": lambda task: _of_all(BKIMap(task.truth.classes, resolution=0.05, ell=0.15), task),
 }
 """The methods by name, the GP first."""
@@ -69,7 +69,8 @@ def demo_pictures(scan: SyntheticScan, prediction: Prediction) -> dict[str, NDAr
         "gp-map": by_class(prediction.label, classes),
         "uncertainty": by_value(prediction.entropy, 0.0, most),
     }
-    pictures = {name: splat(points, colour, view, size) for name, colour in colours.items()}
+    sizes = {"input": size * np.where(scan.observed.labelled, 1.8, 1.0)}
+    pictures = {name: splat(points, colour, view, sizes.get(name, size)) for name, colour in colours.items()}
     titles = ("truth", "input: sparse, missing and wrong labels", "GP map", "its uncertainty (entropy)")
     grid = panels(list(pictures.values()), titles, columns=2)
     bar = colour_bar(0.0, most, "entropy in nats")

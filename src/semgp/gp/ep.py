@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from semgp.gp.covariance import DenseCovariance, DenseFactor, Term
 from semgp.gp.kernels import Array
@@ -86,11 +87,7 @@ def expectation_propagation(
             change = abs(change_nu - mu[i] * change_tau) * np.sqrt(Sigma[i, i]) + abs(change_tau) * Sigma[i, i]
             largest_change = max(largest_change, change)
             nu[i], tau[i] = new_nu, new_tau
-            # line 10: a rank-one change of the posterior
-            s = Sigma[:, i].copy()
-            gain = 1 / (1 + change_tau * s[i])
-            mu += gain * (change_nu - change_tau * mu[i]) * s
-            Sigma -= (change_tau * gain) * np.outer(s, s)
+            _update_posterior(Sigma, mu, i, change_nu, change_tau)  # line 10
         factor = K.factorise(tau)
         half = factor.half_solve(K.K)  # lines 13 to 15
         Sigma = K.K - half.T @ half
@@ -100,6 +97,19 @@ def expectation_propagation(
     a = nu - factor.solve(K.matvec(nu))
     nlml = 0.5 * factor.log_det_B + _nlml_of_sites(likelihood, y, m, mu, np.diag(Sigma), nu, tau)
     return EP(nlml, a, factor, converged, sweeps)
+
+
+@njit(cache=True, nogil=True)
+def _update_posterior(Sigma: Array, mu: Array, i: int, change_nu: float, change_tau: float) -> None:
+    """Change the posterior by a change of site i: of rank one, in place."""
+    s = Sigma[i].copy()
+    gain = 1 / (1 + change_tau * s[i])
+    step = gain * (change_nu - change_tau * mu[i])
+    for j in range(len(mu)):
+        mu[j] += step * s[j]
+        shrink = change_tau * gain * s[j]
+        for k in range(len(mu)):
+            Sigma[j, k] -= shrink * s[k]
 
 
 def _site(likelihood: Likelihood, y: float, m: float, nu: float, tau: float) -> tuple[float, float]:

@@ -27,7 +27,7 @@ def save_map(semantic_map: SemanticMap, path: str | Path) -> None:
     semantic_map : SemanticMap
         Any map.
     path : str or Path
-        The file, by custom `*.semgp`; replaced where it exists.
+        The file, by custom `*.semgp`, replaced where it exists.
     """
     header, arrays = semantic_map.to_arrays()
     classes = semantic_map.classes
@@ -39,8 +39,9 @@ def save_map(semantic_map: SemanticMap, path: str | Path) -> None:
         "map": header,
     }
     text = np.frombuffer(json.dumps(described).encode(), dtype=np.uint8)
+    members: dict[str, Any] = {"header": text} | {f"map.{name}": array for name, array in arrays.items()}
     with atomic_write(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, header=text, **{f"map.{name}": array for name, array in arrays.items()})
+        np.savez_compressed(file, **members)
 
 
 def load_map(path: str | Path) -> SemanticMap:

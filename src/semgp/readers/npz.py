@@ -47,6 +47,9 @@ KINDS = {
 }
 """Kinds of numpy type that each array of the layout may have."""
 
+LARGEST_UNPACKED = 1 << 30
+"""Bytes up to which any file is unpacked, however small it is."""
+
 DAMAGE = (
     *(OSError, EOFError, ValueError, KeyError, TypeError, OverflowError, RuntimeError, SyntaxError),
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError),
@@ -83,8 +86,8 @@ def read_npz(path: str | Path, *, classes: Classes | None = None) -> LabelledClo
         raise FileFormatError(path, str(error)) from error
 
 
-def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Return those of the named arrays that an npz file holds, without ever unpickling.
+def read_arrays(path: Path, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
+    """Return the arrays that an npz file holds, or those of the names given, without ever unpickling.
 
     Raises
     ------
@@ -93,13 +96,21 @@ def read_arrays(path: Path, names: Collection[str]) -> dict[str, NDArray[Any]]:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            members = {name: f"{name}.npy" for name in names}
-            present = set(archive.namelist())
-            return {n: _read_npy(archive.read(m)) for n, m in members.items() if m in present}
+            stored = [member.removesuffix(".npy") for member in archive.namelist()]
+            wanted = stored if names is None else [name for name in names if name in stored]
+            _refuse_bombs(path, archive)
+            return {name: _read_npy(archive.read(f"{name}.npy")) for name in wanted}
     except FileNotFoundError as error:
         raise FileFormatError(path, "no such file.") from error
     except DAMAGE as error:
         raise FileFormatError(path, f"is no npz file, or is damaged: {error}") from error
+
+
+def _refuse_bombs(path: Path, archive: zipfile.ZipFile) -> None:
+    """Raise FileFormatError for an archive that swells a thousandfold and to more than a scan ever takes."""
+    unpacked = sum(member.file_size for member in archive.infolist())
+    if unpacked > LARGEST_UNPACKED and unpacked > 1000 * path.stat().st_size:
+        raise FileFormatError(path, f"would unpack to {unpacked:,} bytes: refused as a decompression bomb.")
 
 
 def _read_npy(raw: bytes) -> NDArray[Any]:
