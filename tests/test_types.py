@@ -72,7 +72,10 @@ class TestLabelledCloud:
         ("settings", "message"),
         [
             ({"points": POINTS[:, :2]}, r"shape \(N, 3\), not \(4, 2\)"),
-            ({"points": np.where(POINTS == 4, np.nan, POINTS)}, "NaN or infinite values in 1 of 4 rows, first in row 1"),
+            (
+                {"points": np.where(POINTS == 4, np.nan, POINTS)},
+                "NaN or infinite values in 1 of 4 rows, first in row 1",
+            ),
             ({"points": np.where(POINTS == 4, np.inf, POINTS)}, "isfinite"),
             ({"points": "here"}, "array of numbers"),
             ({"labels": np.zeros(3, int)}, r"shape \(4,\) to go with 4 points"),

@@ -50,9 +50,9 @@ class LabelledCloud:
     points: NDArray[np.float64]
     classes: Classes
     labels: NDArray[np.int32] | None = None
-    weights: NDArray[np.float32] | None = None
+    weights: NDArray[np.floating[Any]] | None = None
     colours: NDArray[np.uint8] | None = None
-    features: NDArray[np.float32] | None = None
+    features: NDArray[np.floating[Any]] | None = None
     feature_names: tuple[str, ...] = ()
     T_world_sensor: NDArray[np.float64] | None = None
     pixels: NDArray[np.int32] | None = None
@@ -128,7 +128,7 @@ class LabelledCloud:
     def class_weights(self) -> NDArray[np.float32]:
         """Class weights (N, C): the soft labels, or one in the column of the hard label; zeros where missing."""
         if self.weights is not None:
-            return self.weights
+            return self.weights.astype(np.float32, copy=False)
         w = np.zeros((len(self), len(self.classes)), dtype=np.float32)
         rows = np.flatnonzero(self.labelled)
         w[rows, self.hard_labels[rows]] = 1

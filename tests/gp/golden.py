@@ -1,6 +1,7 @@
 """The golden values, as arrays."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,14 @@ VALUES: dict[str, dict[str, Any]] = _RAW["values"]
 
 def kernel(setting: str, kind: str = "") -> Stationary:
     """Return the kernel of a setting; `kind` is the suffix of the entry's name."""
-    kinds = {"matern12": Matern12, "matern32": Matern32, "se": SquaredExponential}
+    kinds: dict[str, Callable[..., Stationary]] = {
+        "matern12": Matern12,
+        "matern32": Matern32,
+        "se": SquaredExponential,
+    }
     h = HYPER[setting]
-    return kinds.get(kind, Matern52)(tuple(np.exp(h["log_ell"])), float(np.exp(h["log_sf"])))
+    make: Callable[..., Stationary] = kinds.get(kind, Matern52)
+    return make(tuple(np.exp(h["log_ell"])), float(np.exp(h["log_sf"])))
 
 
 def targets(c: int) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ def test_one_point_is_exact(likelihood: Likelihood, sf: float, m: float, y: floa
     def moment(k: int) -> float:
         def integrand(f: float) -> float:
             density = np.exp(-(((f - m) / sf) ** 2) / 2) / np.sqrt(2 * np.pi) / sf
-            return f**k * float(likelihood.sigmoid(np.array(y * f))) * density
+            return float(f**k * likelihood.sigmoid(np.array(y * f)) * density)
 
         return float(quad(integrand, m - 10 * sf, m + 10 * sf, epsabs=1e-12)[0])
 
@@ -46,7 +46,9 @@ def test_gradients_match_differences(likelihood: Likelihood) -> None:
     ep = expectation_propagation(K, likelihood, y, m)
     for p, direction in enumerate(np.eye(4)):
         up, down = (kernel.with_theta(kernel.theta + s * direction) for s in (step, -step))
-        assert K.gradient([ep.term])[p] == pytest.approx((nlml(up, m) - nlml(down, m)) / (2 * step), rel=1e-4, abs=1e-6)
+        assert K.gradient([ep.term])[p] == pytest.approx(
+            (nlml(up, m) - nlml(down, m)) / (2 * step), rel=1e-4, abs=1e-6
+        )
     expected = (nlml(kernel, m + step) - nlml(kernel, m - step)) / (2 * step)
     assert gradient_in_mean(ep.term) == pytest.approx(expected, rel=1e-4)
 

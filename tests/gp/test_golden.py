@@ -1,12 +1,16 @@
 """The core against the paper's own toolbox; see tests/reference/README.md."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
-from semgp.gp.covariance import DenseCovariance
+from semgp.gp.covariance import Covariance, DenseCovariance
 from semgp.gp.ep import expectation_propagation
 from semgp.gp.fitc import FITCCovariance
 from semgp.gp.hyperparameters import Bounds, learn
+from semgp.gp.kernels import Kernel
 from semgp.gp.laplace import gradient_in_mean, laplace
 from semgp.gp.likelihoods import Probit
 from tests.gp.golden import HYPER, VALUES, Q, U, X, kernel, relative_error, targets
@@ -20,7 +24,11 @@ EP = [name for name in VALUES if "_ep" in name]
 def test_laplace_matches_the_toolbox(name: str) -> None:
     c, setting, structure, *kind = name.split("_")
     k = kernel(setting, "".join(kind))
-    K = FITCCovariance(k, X, U, absolute_jitter=kind == ["absjit"]) if structure == "fitc" else DenseCovariance(k, X)
+    K = (
+        FITCCovariance(k, X, U, absolute_jitter=kind == ["absjit"])
+        if structure == "fitc"
+        else DenseCovariance(k, X)
+    )
     m = HYPER[setting]["mean"]
     posterior = laplace(K, PROBIT, targets(int(c[1])), m)
     term = posterior.term(K)
@@ -57,8 +65,12 @@ def test_expectation_propagation_matches_the_toolbox(name: str) -> None:
 @pytest.mark.parametrize("structure", ["dense", "fitc"])
 @pytest.mark.parametrize("c", range(4))
 def test_model_selection_goes_as_low_as_the_toolbox(c: int, structure: str) -> None:
+    structures: dict[str, Callable[[Kernel], Covariance[Any]]] = {
+        "dense": lambda kernel: DenseCovariance(kernel, X),
+        "fitc": lambda kernel: FITCCovariance(kernel, X, U),
+    }
     learned = learn(
-        (lambda k: FITCCovariance(k, X, U)) if structure == "fitc" else (lambda k: DenseCovariance(k, X)),
+        structures[structure],
         kernel("A"),
         PROBIT,
         targets(c)[:, None],

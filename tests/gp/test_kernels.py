@@ -26,8 +26,11 @@ def inputs() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return X, np.vstack([rng.normal(size=(7, 4)), X[:2]])
 
 
-def subclasses(kind: type) -> set[type]:
-    return {kind, *(s for child in kind.__subclasses__() for s in subclasses(child))}
+def subclasses(kind: type[Kernel]) -> set[type[Kernel]]:
+    found = {kind}
+    for child in kind.__subclasses__():
+        found |= subclasses(child)
+    return found
 
 
 def test_every_kernel_has_a_row() -> None:
@@ -79,7 +82,9 @@ def test_algebra_is_that_of_matrices(inputs: tuple) -> None:  # type: ignore[typ
     np.testing.assert_allclose(Product(a, b)(X, Z), a(X, Z) * b(X, Z))
 
 
-@pytest.mark.parametrize("bad", [{"ell": (0.0,)}, {"ell": (-1.0,)}, {"ell": (1.0,), "sf": np.nan}, {"ell": (np.inf,)}])
+@pytest.mark.parametrize(
+    "bad", [{"ell": (0.0,)}, {"ell": (-1.0,)}, {"ell": (1.0,), "sf": np.nan}, {"ell": (np.inf,)}]
+)
 def test_parameters_must_be_positive(bad: dict) -> None:  # type: ignore[type-arg]
     with pytest.raises(InputError, match="positive"):
         Matern52(**bad)

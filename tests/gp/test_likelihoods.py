@@ -11,6 +11,7 @@ from scipy.integrate import quad
 
 from semgp.gp.likelihoods import LIKELIHOODS, Likelihood
 
+
 def exact_probit(z: mp.mpf) -> tuple[mp.mpf, ...]:
     """Return log Phi(z) and three derivatives, by the textbook formulas in 300 digits."""
     log_p = mp.log1p(-mp.erfc(z / mp.sqrt(2)) / 2) if z > 0 else mp.log(mp.erfc(-z / mp.sqrt(2)) / 2)
@@ -64,7 +65,7 @@ def test_averages_match_quadrature(likelihood: Likelihood, mean: float, variance
     s = np.sqrt(variance)
 
     def integrand(z: float) -> float:
-        return float(likelihood.sigmoid(np.array(mean + s * z))) * np.exp(-z * z / 2) / np.sqrt(2 * np.pi)
+        return float(likelihood.sigmoid(np.array(mean + s * z)) * np.exp(-z * z / 2) / np.sqrt(2 * np.pi))
 
     step = np.clip(-mean / s, -12, 12)
     expected = quad(integrand, -12, step, epsabs=1e-14)[0] + quad(integrand, step, 12, epsabs=1e-14)[0]

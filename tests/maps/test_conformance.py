@@ -72,7 +72,9 @@ def test_two_updates_equal_one(make: Callable[[Classes], SemanticMap], corner: L
     )
 
 
-def test_soft_one_hot_labels_equal_hard_ones(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_soft_one_hot_labels_equal_hard_ones(
+    make: Callable[[Classes], SemanticMap], corner: LabelledCloud
+) -> None:
     soft = replace(corner, labels=None, weights=corner.class_weights)
     hard = built(make, corner).query(corner.points)
     np.testing.assert_allclose(built(make, soft).query(corner.points).probability, hard.probability, atol=1e-6)
@@ -151,7 +153,9 @@ class TestBadInput:
         with pytest.raises(InputError, match="classes"):
             make(Classes(("road", "car"))).update(corner)
 
-    @pytest.mark.parametrize("bad", [np.full((2, 3), np.nan), np.full((2, 3), np.inf), np.zeros((3, 2)), np.zeros(3)])
+    @pytest.mark.parametrize(
+        "bad", [np.full((2, 3), np.nan), np.full((2, 3), np.inf), np.zeros((3, 2)), np.zeros(3)]
+    )
     def test_query_points(
         self, make: Callable[[Classes], SemanticMap], corner: LabelledCloud, bad: np.ndarray
     ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,7 @@ from rich.table import Table
 from semgp.errors import InputError
 from semgp.writers import atomic_write
 
-STDOUT = Console()
+STDOUT = Console(width=None if sys.stdout.isatty() else 120)
 STDERR = Console(stderr=True)
 
 
@@ -43,7 +44,8 @@ def score_table(title: str, rows: Sequence[dict[str, Any]], columns: Sequence[st
     """Return a table of rows of scores, numbers to four digits, seconds to two."""
     table = Table(title=title, title_justify="left")
     for name in columns:
-        table.add_column(name.replace("_", " "), justify="left" if name in ("frame", "method") else "right")
+        heading = name.replace("_seconds", " s").replace("n_", "").replace("_", " ")
+        table.add_column(heading, justify="left" if name in ("frame", "method") else "right")
     for row in rows:
         table.add_row(*(_cell(name, row.get(name)) for name in columns))
     return table

@@ -38,5 +38,7 @@ def demo(*, out: Path = Path("semgp-demo"), seed: int = 0, quiet: bool = False) 
             save_png(out / f"{name}.png", picture)
         save_map(results[0].semantic_map, out / "room.semgp")
     columns = ("method", "auc", "accuracy", "miou", "nll", "ece", "fit_seconds", "query_seconds")
-    STDOUT.print(score_table("A synthetic room, sparse and partly wrong labels", [r.row() for r in results], columns))
+    STDOUT.print(
+        score_table("A synthetic room, sparse and partly wrong labels", [r.row() for r in results], columns)
+    )
     STDOUT.print(f"{out}/overview.png shows it; {out}/room.semgp is the map. Next: semgp info {out}/room.semgp")

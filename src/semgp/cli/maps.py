@@ -10,6 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from semgp.cli.console import STDOUT, progress, score_table, write_json
+from semgp.cli.options import JsonOut
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.evaluation.scores import score
@@ -21,7 +22,7 @@ from semgp.maps.learning import learn_model
 from semgp.maps.protocol import SemanticMap
 from semgp.maps.surface import surface_grid
 from semgp.prediction import Prediction
-from semgp.readers import open_scans, read
+from semgp.readers import open_scans
 from semgp.writers import write_npz, write_ply
 
 Kind = Literal["gp", "octomap", "knn", "csm", "bki"]
@@ -142,7 +143,7 @@ def query(
     STDOUT.print(f"{out}: {len(X):,} points, {seen:,} of them observed")
 
 
-def evaluate(map_file: Path, /, *, truth: Path, json: Path | None = None) -> None:
+def evaluate(map_file: Path, /, *, truth: Path, json: JsonOut = None) -> None:
     """Score a map against points with true labels.
 
     Example: semgp evaluate room.semgp --truth room-truth.ply

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import App
 
+from semgp.cli.options import JsonOut
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
@@ -16,7 +18,7 @@ reproduce = App(name="reproduce", help="Run the experiments of the paper on real
 
 COLUMNS = (
     *("frame", "method", "auc", "accuracy", "miou", "nll", "ece", "coverage"),
-    *("n_train", "n_query", "fit_seconds", "query_seconds"),
+    *("n_train", "n_query", "fit_seconds", "query_seconds", "peak_rss_mb"),
 )
 
 
@@ -31,7 +33,7 @@ def nyu(
     soft: bool = False,
     classes: Literal[13, 40] = 13,
     seed: int = 0,
-    json: Path | None = None,
+    json: JsonOut = None,
     quiet: bool = False,
 ) -> None:
     """Run the paper's experiments on NYU Depth V2.
