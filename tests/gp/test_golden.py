@@ -8,6 +8,7 @@ import pytest
 
 from semgp.gp.covariance import Covariance, DenseCovariance
 from semgp.gp.ep import expectation_propagation
+from semgp.gp.expert import covariance
 from semgp.gp.fitc import FITCCovariance
 from semgp.gp.hyperparameters import Bounds, learn
 from semgp.gp.kernels import Kernel
@@ -24,11 +25,9 @@ EP = [name for name in VALUES if "_ep" in name]
 def test_laplace_matches_the_toolbox(name: str) -> None:
     c, setting, structure, *kind = name.split("_")
     k = kernel(setting, "".join(kind))
-    K = (
-        FITCCovariance(k, X, U, absolute_jitter=kind == ["absjit"])
-        if structure == "fitc"
-        else DenseCovariance(k, X)
-    )
+    K = covariance(k, X, U if structure == "fitc" else None)
+    if kind == ["absjit"]:
+        K = FITCCovariance(k, X, U, absolute_jitter=True)
     m = HYPER[setting]["mean"]
     posterior = laplace(K, PROBIT, targets(int(c[1])), m)
     term = posterior.term(K)

@@ -26,8 +26,9 @@ def inputs() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return X, np.vstack([rng.normal(size=(7, 4)), X[:2]])
 
 
-def subclasses(kind: type[Kernel]) -> set[type[Kernel]]:
-    found = {kind}
+def subclasses(kind: type) -> set[type]:
+    found: set[type] = {kind}
+    child: type
     for child in kind.__subclasses__():
         found |= subclasses(child)
     return found
