@@ -300,6 +300,8 @@ class TestBadInput:
             SemanticOctoMap(CLASSES, max_range=0)
         with pytest.raises(InputError, match="origin"):
             SemanticOctoMap(CLASSES, origin=(0, np.nan, 0))
+        with pytest.raises(InputError, match="upper"):
+            built(random_cloud(0)).unknown((0, 0, 0), (1, 1))
         with pytest.raises(InputError, match="clamp_min"):
             SensorModel(hit=0.3)
         with pytest.raises(InputError, match="threshold"):

@@ -7,8 +7,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -16,7 +17,7 @@ from rich.table import Table
 from semgp.errors import InputError
 from semgp.writers import atomic_write
 
-STDOUT = Console(width=None if sys.stdout.isatty() else 120)
+STDOUT = Console(width=None if sys.stdout.isatty() else 110)
 STDERR = Console(stderr=True)
 
 
@@ -40,23 +41,29 @@ def write_json(path: Path | None, value: Any) -> None:
         temporary.write_text(text)
 
 
+HEADINGS = {
+    **{"auc": "AUC", "miou": "mIoU", "nll": "NLL", "ece": "ECE", "brier": "Brier", "n_train": "labels"},
+    **{"fit_seconds": "fit s", "query_seconds": "query s", "peak_rss_mb": "MB"},
+}
+
+
 def score_table(title: str, rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> Table:
-    """Return a table of rows of scores, numbers to four digits, seconds to two."""
-    table = Table(title=title, title_justify="left")
+    """Return a table of rows of scores, numbers to four digits, seconds to two, all else to whole numbers."""
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in columns:
-        heading = name.replace("_seconds", " s").replace("n_", "").replace("_", " ")
-        table.add_column(heading, justify="left" if name in ("frame", "method") else "right")
+        justify: Literal["left", "right"] = "left" if name in ("frame", "method") else "right"
+        table.add_column(HEADINGS.get(name, name), justify=justify, no_wrap=True)
     for row in rows:
-        table.add_row(*(_cell(name, row.get(name)) for name in columns))
+        table.add_row(*(_cell(name, row.get(name)) for name in columns), end_section=row.get("frame") == "mean")
     return table
 
 
 def _cell(name: str, value: Any) -> str:
     if value is None:
         return "-"
-    if isinstance(value, float):
+    if isinstance(value, float) and name not in ("n_train", "peak_rss_mb"):
         return f"{value:.2f}" if name.endswith("seconds") else f"{value:.4f}"
-    return f"{value:,}" if isinstance(value, int) else str(value)
+    return f"{value:,.0f}" if isinstance(value, int | float) else str(value)
 
 
 def require_folder(path: Path) -> Path:

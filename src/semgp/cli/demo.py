@@ -34,9 +34,12 @@ def demo(*, out: Path = Path("semgp-demo"), seed: int = 0, quiet: bool = False) 
             bars.update(bar, advance=1, description=f"mapping it: {name}")
             results.append(run(task, name, method))
         bars.update(bar, advance=1, description="drawing")
-        for name, picture in demo_pictures(scan, results[0].prediction).items():
+        gp = results[0]
+        assert gp.prediction is not None
+        assert gp.semantic_map is not None
+        for name, picture in demo_pictures(scan, gp.prediction).items():
             save_png(out / f"{name}.png", picture)
-        save_map(results[0].semantic_map, out / "room.semgp")
+        save_map(gp.semantic_map, out / "room.semgp")
     columns = ("method", "auc", "accuracy", "miou", "nll", "ece", "fit_seconds", "query_seconds")
     STDOUT.print(
         score_table("A synthetic room, sparse and partly wrong labels", [r.row() for r in results], columns)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,15 +12,14 @@ from cyclopts import App
 from semgp.cli.options import JsonOut
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from semgp.evaluation.task import Method, Result, Task
+    from semgp.evaluation.experiment import Experiment
+    from semgp.evaluation.task import Method
 
 reproduce = App(name="reproduce", help="Run the experiments of the paper on real data and print their tables.")
 
 COLUMNS = (
     *("frame", "method", "auc", "accuracy", "miou", "nll", "ece", "coverage"),
-    *("n_train", "n_query", "fit_seconds", "query_seconds", "peak_rss_mb"),
+    *("n_train", "fit_seconds", "query_seconds", "peak_rss_mb"),
 )
 
 
@@ -34,11 +35,13 @@ def nyu(
     classes: Literal[13, 40] = 13,
     seed: int = 0,
     json: JsonOut = None,
+    report: Path | None = None,
+    room: Path | None = None,
     quiet: bool = False,
 ) -> None:
     """Run the paper's experiments on NYU Depth V2.
 
-    Example: semgp reproduce nyu nyu_depth_v2_labeled.mat --methods gpsm,gpsm-averaged,knn
+    Example: semgp reproduce nyu nyu_depth_v2_labeled.mat --methods gpsm,gpsm-averaged,knn,octomap
 
     Parameters
     ----------
@@ -58,51 +61,120 @@ def nyu(
         Seed of the training subset and of all that the methods draw.
     json
         Write the rows to this file, or to standard output with "-".
+    report
+        Write a report into this folder: tables with the paper's numbers beside ours, maps, curves, settings.
+    room
+        Folder of a labelled Stanford 2D-3D-S room (.pcd pieces), whose OctoMap the report shows, too.
     quiet
         Show no progress and no table.
     """
-    from semgp.cli.console import write_json
+    from semgp.evaluation.figures import camera_view
     from semgp.evaluation.nyu import METHODS, nyu_task
     from semgp.readers import open_nyu
 
     chosen = _choose(methods, METHODS)
     source = open_nyu(data)
-    tasks = (nyu_task(source.read(f, classes), experiment, soft, seed) for f in _numbers(frames))
-    results = list(_run(tasks, chosen, quiet))
+    tasks = (nyu_task(source.read(f, classes), experiment, soft, seed) for f in _numbers("frames", frames, int))
+    view = (lambda task: camera_view(task.truth)) if report else None
     settings = {"experiment": experiment, "soft": soft, "classes": classes, "seed": seed}
-    _print(f"NYU Depth V2, {experiment} labels, {classes} classes", results, quiet or str(json) == "-")
-    write_json(json, {**settings, "rows": [result.row() for result in results]})
+    title = f"NYU Depth V2, {experiment} labels{', soft' if soft else ''}, {classes} classes"
+    _finish(_run(tasks, chosen, quiet, view=view), title, settings, json, report, room, quiet)
 
 
-def _run(tasks: Iterator[Task], methods: Mapping[str, Method], quiet: bool) -> Iterator[Result]:
-    """Yield the result of every method on every task, with progress."""
+@reproduce.command
+def semantickitti(
+    data: Path,
+    /,
+    *,
+    keep: str = "1.0,0.01,0.002",
+    methods: str = "csm,bki,knn",
+    scans: int = 10,
+    seed: int = 0,
+    json: JsonOut = None,
+    report: Path | None = None,
+    quiet: bool = False,
+) -> None:
+    """Map a network's labels of SemanticKITTI scans, and score at every truly labelled point.
+
+    Example: semgp reproduce semantickitti sequences/08 --methods csm,bki,knn --keep 1.0,0.01
+
+    Parameters
+    ----------
+    data
+        A sequence: velodyne, labels, predictions, poses.txt, calib.txt.
+    keep
+        Shares of the points whose labels the map gets, with commas between.
+    methods
+        Names with commas between: labels, csm, bki, bki-wide, knn, octomap.
+    scans
+        So many of the first scans.
+    seed
+        Seed of all that is drawn.
+    json
+        Write the rows to this file, or to standard output with "-".
+    report
+        Write a report into this folder: tables with published numbers beside ours, maps, curves, settings.
+    quiet
+        Show no progress and no table.
+    """
+    from semgp.evaluation.figures import street_view
+    from semgp.evaluation.semantic_kitti import METHODS, kitti_sequence, kitti_task
+
+    chosen = _choose(methods, METHODS)
+    sequence = kitti_sequence(data)
+    tasks = (kitti_task(sequence, share, seed, scans) for share in _numbers("keep", keep, float))
+    view = (lambda task: street_view(task.truth)) if report else None
+    ran = _run(tasks, chosen, quiet, view=view, disc_scale=2.5)
+    _finish(ran, "SemanticKITTI", {"scans": scans, "seed": seed}, json, report, None, quiet)
+
+
+def _run(tasks: Iterable[Any], methods: Mapping[str, Method], quiet: bool, **drawing: Any) -> Experiment:
+    """Run an experiment with progress."""
     from semgp.cli.console import progress
-    from semgp.evaluation.task import run
+    from semgp.evaluation.experiment import run_experiment
 
     with progress(quiet) as bars:
         bar = bars.add_task("", total=None)
-        for task in tasks:
-            for name, method in methods.items():
-                bars.update(bar, description=f"{task.name}: {name}")
-                yield run(task, name, method)
+
+        def step(task: str, method: str) -> None:
+            bars.update(bar, description=f"{task}: {method}")
+
+        return run_experiment(tasks, methods, step, **drawing)
 
 
-def _print(title: str, results: list[Result], quiet: bool) -> None:
-    """Print the table, with each method's mean over the frames below."""
-    from semgp.cli.console import STDOUT, score_table
+def _finish(
+    experiment: Experiment,
+    title: str,
+    settings: dict[str, Any],
+    json: Path | None,
+    report: Path | None,
+    room: Path | None,
+    quiet: bool,
+) -> None:
+    """Print the tables, with each method's mean over the frames, and write what was asked for."""
+    from semgp.cli.console import STDOUT, score_table, write_json
+    from semgp.evaluation import experiment as experiments
 
-    if quiet:
-        return
-    rows = [result.row() for result in results]
-    means = [_mean(name, rows) for name in dict.fromkeys(row["method"] for row in rows)]
-    STDOUT.print(score_table(title, rows + (means if len(rows) > len(means) else []), COLUMNS))
+    rows = [result.row() for result in experiment.results]
+    if not (quiet or str(json) == "-"):
+        for name in dict.fromkeys(row["experiment"] for row in rows):
+            of_name = [row for row in rows if row["experiment"] == name]
+            means = [_mean(method, of_name) for method in dict.fromkeys(row["method"] for row in of_name)]
+            STDOUT.print(
+                score_table(f"{title}: {name}", of_name + (means if len(of_name) > len(means) else []), COLUMNS)
+            )
+    write_json(json, {**settings, "rows": rows})
+    if report is not None:
+        command = " ".join(["semgp", *sys.argv[1:]])
+        page = experiments.report(report, experiment, title, settings, command, room)
+        STDOUT.print(f"{page}: open it in a browser")
 
 
 def _mean(method: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the mean row of a method."""
     mine = [row for row in rows if row["method"] == method]
     numbers = {name: sum(row[name] for row in mine) / len(mine) for name in COLUMNS[2:]}
-    return {"frame": "mean", "method": method} | numbers | {n: round(numbers[n]) for n in ("n_train", "n_query")}
+    return {"frame": "mean", "method": method} | numbers
 
 
 def _choose(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
@@ -122,17 +194,18 @@ def _choose(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
     return {name: known[name] for name in chosen}
 
 
-def _numbers(text: str) -> list[int]:
-    """Return the whole numbers of a comma-separated list.
+def _numbers(name: str, text: str, kind: type[int] | type[float]) -> list[Any]:
+    """Return the numbers of a comma-separated list.
 
     Raises
     ------
     InputError
-        Something else than whole numbers.
+        Something else than such numbers.
     """
     from semgp.errors import InputError
 
     try:
-        return [int(part) for part in text.split(",")]
+        return [kind(part) for part in text.split(",")]
     except ValueError as error:
-        raise InputError(f"frames must be whole numbers with commas between, not {text!r}.") from error
+        sort = "whole numbers" if kind is int else "numbers"
+        raise InputError(f"--{name} must be {sort} with commas between, not {text!r}.") from error

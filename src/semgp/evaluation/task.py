@@ -77,14 +77,17 @@ Method = Callable[[Task], Built]
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """One method's answer to one task: a row of the table, and what figures are made of."""
+    """One method's answer to one task: a row of the table, and what figures are made of.
+
+    Prediction and map may be let go (None) once the figures are drawn.
+    """
 
     frame: str
     method: str
     experiment: str
     scores: Scores
-    prediction: Prediction
-    semantic_map: SemanticMap
+    prediction: Prediction | None
+    semantic_map: SemanticMap | None
     n_train: int
     fit_seconds: float
     query_seconds: float
