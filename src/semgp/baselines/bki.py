@@ -8,13 +8,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.baselines.common import require_data, require_positive, stored_setting
 from semgp.baselines.smoothing import spread
 from semgp.baselines.voxels import VoxelMass
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.protocol import query_points, training_part
+from semgp.maps.settings import require_data, require_positive, stored_setting
 from semgp.parallel import parallel_map, slices
 from semgp.prediction import Prediction
 

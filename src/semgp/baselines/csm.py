@@ -8,11 +8,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.baselines.common import require_data, require_positive, require_prior, stored_setting
 from semgp.baselines.voxels import VoxelMass
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.maps.protocol import query_points, training_part
+from semgp.maps.settings import require_data, require_positive, require_prior, stored_setting
 from semgp.prediction import Prediction
 
 

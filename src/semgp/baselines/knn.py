@@ -10,11 +10,11 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from semgp.baselines.common import require_data, require_positive, require_prior, stored_array, stored_setting
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.protocol import query_points, training_part
+from semgp.maps.settings import require_data, require_positive, require_prior, stored_array, stored_setting
 from semgp.parallel import parallel_map, slices
 from semgp.prediction import Prediction
 

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgp.baselines.common import stored_array
 from semgp.errors import InputError
+from semgp.maps.settings import stored_array
 from semgp.parallel import parallel_map, slices
 from semgp.voxels import VoxelTable, voxel_centres, voxel_keys, voxel_origin
 

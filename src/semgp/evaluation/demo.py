@@ -69,7 +69,7 @@ def demo_pictures(scan: SyntheticScan, prediction: Prediction) -> dict[str, NDAr
         "gp-map": by_class(prediction.label, classes),
         "uncertainty": by_value(prediction.entropy, 0.0, most),
     }
-    sizes = {"input": size * np.where(scan.observed.labelled, 1.8, 1.0)}
+    sizes = {"input": size * np.where(scan.observed.labelled, 1.4, 1.0)}
     pictures = {name: splat(points, colour, view, sizes.get(name, size)) for name, colour in colours.items()}
     titles = ("truth", "input: sparse, missing and wrong labels", "GP map", "its uncertainty (entropy)")
     grid = panels(list(pictures.values()), titles, columns=2)

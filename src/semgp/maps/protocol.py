@@ -54,8 +54,8 @@ class SemanticMap(Protocol):
         ...
 
 
-def training_part(cloud: LabelledCloud, classes: Classes) -> LabelledCloud:
-    """Return the labelled points of a cloud, checked against a map's classes.
+def require_classes(cloud: LabelledCloud, classes: Classes) -> None:
+    """Check that a cloud's labels speak of a map's classes.
 
     Raises
     ------
@@ -67,6 +67,17 @@ def training_part(cloud: LabelledCloud, classes: Classes) -> LabelledCloud:
             f"the cloud's classes ({', '.join(cloud.classes.names)}) are not the map's "
             f"({', '.join(classes.names)}): give the cloud the map's classes."
         )
+
+
+def training_part(cloud: LabelledCloud, classes: Classes) -> LabelledCloud:
+    """Return the labelled points of a cloud, checked against a map's classes.
+
+    Raises
+    ------
+    InputError
+        Classes that differ from the map's.
+    """
+    require_classes(cloud, classes)
     return cloud[cloud.labelled]
 
 

@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.baselines.common import stored_array
 from semgp.errors import InputError
+from semgp.maps.settings import stored_array
 from semgp.octomap import brick_kernels as kernels
 from semgp.octomap.brick_kernels import Store
 from semgp.octomap.index import CodeIndex, require_ascending, room_for

@@ -8,9 +8,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.baselines.common import stored_array
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
+from semgp.maps.settings import stored_array
 from semgp.octomap import label_kernels as kernels
 from semgp.octomap.index import CodeIndex, require_ascending, room_for
 from semgp.octomap.label_kernels import Chains

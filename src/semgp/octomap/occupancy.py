@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.baselines.common import require_positive
 from semgp.errors import InputError
 from semgp.maps.protocol import query_points
+from semgp.maps.settings import require_positive
 from semgp.octomap.bricks import Bricks
 from semgp.octomap.cells import Cells, Occupancy
 from semgp.octomap.morton import DEPTH, HALF, OUTSIDE, cell_centres, voxel_codes

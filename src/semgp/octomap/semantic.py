@@ -10,11 +10,11 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.baselines.common import stored_setting
 from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.maps.protocol import query_points
+from semgp.maps.protocol import query_points, require_classes
+from semgp.maps.settings import stored_setting
 from semgp.octomap.bricks import Bricks
 from semgp.octomap.files import FREE, OCCUPIED, UNSET, write_bt, write_ot
 from semgp.octomap.labels import VoxelLabels
@@ -75,11 +75,7 @@ class SemanticOctoMap(OccupancyMap):
             Classes that differ from the map's, a cloud without sensor pose, or points or a sensor beyond the
             reach of the map. The map is then as before.
         """
-        if cloud.classes.names != self.classes.names:
-            raise InputError(
-                f"the cloud's classes ({', '.join(cloud.classes.names)}) are not the map's "
-                f"({', '.join(self.classes.names)}): give the cloud the map's classes."
-            )
+        require_classes(cloud, self.classes)
         if self.rays and cloud.origin is None:
             raise InputError(
                 "the cloud has no T_world_sensor, and rays begin at the sensor: give its pose, or make the map "

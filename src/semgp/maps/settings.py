@@ -1,4 +1,4 @@
-"""What the baselines share: checks of settings and stored arrays."""
+"""Checks of a map's settings and stored arrays."""
 
 from __future__ import annotations
 
