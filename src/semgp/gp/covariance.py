@@ -65,8 +65,11 @@ class Covariance(Protocol[F]):
         """Return K v for v (n,)."""
         ...
 
-    def factorise(self, W: Array) -> F:
-        """Factorise K together with curvatures W (n,), W >= 0."""
+    def factorise(self, W: Array, rough: bool = False) -> F:
+        """Factorise K together with curvatures W (n,), W >= 0.
+
+        `rough` allows single precision: enough for Newton steps, whose errors the next step mends.
+        """
         ...
 
     def gradient(self, terms: Sequence[Term[F]]) -> Array:
@@ -99,8 +102,8 @@ class DenseCovariance:
         """Return K v for v (n,)."""
         return self.K @ v
 
-    def factorise(self, W: Array) -> DenseFactor:
-        """Factorise K together with curvatures W (n,)."""
+    def factorise(self, W: Array, rough: bool = False) -> DenseFactor:
+        """Factorise K together with curvatures W (n,), always in double precision."""
         root_W: Array = np.sqrt(W)
         B = root_W[:, None] * self.K * root_W
         B[np.diag_indices(self.n)] += 1

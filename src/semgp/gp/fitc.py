@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from semgp.errors import InputError
@@ -78,16 +80,27 @@ class FITCCovariance:
         """Return K v for v (n,)."""
         return np.asarray((self.V @ v) @ self.V + self.D * v)
 
-    def factorise(self, W: Array) -> FITCFactor:
-        """Factorise K together with curvatures W (n,)."""
+    @cached_property
+    def _V_single(self) -> NDArray[np.float32]:
+        return self.V.astype(np.float32)
+
+    def factorise(self, W: Array, rough: bool = False) -> FITCFactor:
+        """Factorise K together with curvatures W (n,), in single precision where `rough` and possible."""
         T = W / (1 + self.D * W)
+        V = self._V_single if rough else self.V
+        root_T = np.sqrt(T).astype(V.dtype)
         # Saturated points (W ~ 0) are most of a class; leaving them out changes nothing and saves the time.
         share = T * (self.kernel.diag(self.X) - self.D)
         matter = np.flatnonzero(share > ROUNDING)
-        V = self.V * np.sqrt(T) if len(matter) == self.n else self.V[:, matter] * np.sqrt(T[matter])
-        S = V @ V.T
+        VT = V * root_T if len(matter) == self.n else V[:, matter] * root_T[matter]
+        S = VT @ VT.T
         S[np.diag_indices(len(S))] += 1
-        return FITCFactor(self.V, self.D, W, T, np.linalg.cholesky(S))
+        try:
+            return FITCFactor(V, self.D, W, T, np.linalg.cholesky(S))
+        except np.linalg.LinAlgError:
+            if rough:  # too ill conditioned for single precision
+                return self.factorise(W)
+            raise
 
     def gradient(self, terms: Sequence[Term[FITCFactor]]) -> Array:
         """Return the sum over the terms of tr(G dK / dtheta), shape (P,).
@@ -134,11 +147,11 @@ class FITCCovariance:
 class FITCFactor:
     """L L' = S = I + V T V', T = W / (1 + D W)."""
 
-    V: Array
+    V: NDArray[Any]
     D: Array
     W: Array
     T: Array
-    L: Array
+    L: NDArray[Any]
 
     @property
     def log_det_B(self) -> float:
@@ -159,7 +172,7 @@ class FITCFactor:
     def solve(self, v: Array) -> Array:
         """Return R v = T v - T V' S^-1 V T v for v (n,)."""
         Tv = self.T * v
-        half = solve_triangular(self.L, self.V @ Tv, lower=True, check_finite=False)
+        half = solve_triangular(self.L, self.V @ Tv.astype(self.V.dtype), lower=True, check_finite=False)
         return np.asarray(
             Tv - self.T * (solve_triangular(self.L, half, lower=True, trans=1, check_finite=False) @ self.V)
         )

@@ -87,14 +87,16 @@ def laplace(
     a = starting_point(K, y[:, None], np.array([m]))[0] if a is None else a
     Ka = K.matvec(a)
     d = likelihood.derivatives(y, Ka + m)
-    converged = False
-    iterations = 0
+    rough, decrement, converged, iterations = True, np.inf, False, 0
     while not converged and iterations < max_iterations:
         # algorithm 3.1, lines 4 to 6, in terms of the residual, so that rounding errors cannot pile up
         residual = d.d1 - a
-        step = residual - K.factorise(-d.d2).solve(K.matvec(residual))
+        step = residual - K.factorise(-d.d2, rough).solve(K.matvec(residual))
         K_step = K.matvec(step)
-        decrement = float(K_step @ residual)
+        last, decrement = decrement, float(K_step @ residual)
+        if rough and (decrement < 0 or 0.1 * last < decrement < 1):
+            rough = False  # single precision is at its end
+            continue
         converged = decrement <= tolerance
         length, d = _line_search(likelihood, y, Ka + m, K_step, d, float(step @ Ka), float(step @ K_step))
         a = a + length * step
