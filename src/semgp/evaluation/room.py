@@ -14,7 +14,7 @@ from semgp.errors import FileFormatError, InputError
 from semgp.evaluation.cubes import draw_cubes
 from semgp.evaluation.figures import FONT_SIZE, Figure, only, picture_figure
 from semgp.octomap import SemanticOctoMap
-from semgp.picture import GREY, View, by_class, disc_sizes, legend, panels, splat, stack
+from semgp.picture import GREY, View, by_class, disc_sizes, legend, panels, splat, stack, view_of
 from semgp.picture.image import Picture
 from semgp.readers import read_pcd
 
@@ -57,9 +57,8 @@ def stanford_room(folder: str | Path) -> LabelledCloud:
 def into_room(points: NDArray[np.float64], width: int = 640) -> View:
     """Return a view into a room, z up, through its side of greatest y, from above."""
     lower, upper = points.min(axis=0), points.max(axis=0)
-    middle, extent = (lower + upper) / 2, upper - lower
-    eye = middle + (-0.28, 1.15, 1.25) * extent
-    return View.look_at(eye, middle - (0, 0.02, 0.18) * extent, fov=40, width=width, height=width * 2 // 3)
+    eye = (lower + upper) / 2 + (-0.28, 1.15, 1.1) * (upper - lower)
+    return view_of(points, eye, tilt=0, fov=40, width=width, height=width * 2 // 3)
 
 
 def stanford_figure(folder: str | Path) -> Figure:
