@@ -18,13 +18,18 @@ def n_workers() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def one_blas_thread() -> threadpool_limits:
+    """Return a context in which BLAS uses one thread: small matrices are slower with more."""
+    return threadpool_limits(limits=1, user_api="blas")
+
+
 def parallel_map(work: Callable[[T], R], items: Iterable[T], workers: int | None = None) -> list[R]:
     """Return `[work(item) for item in items]`, computed by threads with one BLAS thread each.
 
     The work must release the interpreter lock where it spends its time (numpy, BLAS, `nogil` numba). More
     BLAS threads than workers would fight for the same cores.
     """
-    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(workers or n_workers()) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(workers or n_workers()) as pool:
         return list(pool.map(work, items))
 
 

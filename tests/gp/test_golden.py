@@ -75,6 +75,7 @@ def test_model_selection_goes_as_low_as_the_toolbox(c: int, structure: str) -> N
         targets(c)[:, None],
         np.array([HYPER["A"]["mean"]]),
         Bounds(ell=(1e-4, 1e8), sf=(1e-4, 1e4)),
+        restarts=2,
         max_iterations=200,
     )
     assert learned.nlml <= VALUES[f"c{c}_opt200_{structure}"]["nlml"]

@@ -124,7 +124,7 @@ def semantickitti(
     sequence = kitti_sequence(data)
     tasks = (kitti_task(sequence, share, seed, scans) for share in _numbers("keep", keep, float))
     view = (lambda task: street_view(task.truth)) if report else None
-    ran = _run(tasks, chosen, quiet, view=view, disc_scale=2.5)
+    ran = _run(tasks, chosen, quiet, view=view, disc_scale=1.8)
     _finish(ran, "SemanticKITTI", {"scans": scans, "seed": seed}, json, report, None, quiet)
 
 

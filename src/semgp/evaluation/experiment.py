@@ -13,7 +13,7 @@ from semgp.evaluation.room import stanford_figure
 from semgp.evaluation.task import Method, Result, Task, run
 from semgp.picture import View
 
-SHOWN = ("octomap", "gpsm")
+SHOWN = ("octomap", "bki", "gpsm")
 """Methods whose maps are drawn, the last one with its uncertainty."""
 
 
@@ -80,5 +80,12 @@ def report(
     seed = settings["seed"]
     assert isinstance(seed, int)
     return write_report(
-        folder, experiment.results, figures, title=title, settings=settings, seed=seed, command=command
+        folder,
+        experiment.results,
+        figures,
+        title=title,
+        settings=settings,
+        seed=seed,
+        command=command,
+        classes=experiment.rows[0].classes if experiment.rows else None,
     )

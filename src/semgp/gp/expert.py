@@ -24,7 +24,7 @@ from semgp.gp.model import GPModel
 from semgp.gp.one_vs_rest import binary_targets, class_posteriors
 from semgp.gp.probability import RULES
 from semgp.gp.softmax_expert import SoftmaxExpert
-from semgp.parallel import parallel_map
+from semgp.parallel import one_blas_thread, parallel_map
 
 
 class Expert(Protocol):
@@ -107,10 +107,11 @@ class OneVsRest:
     def _predictors(self) -> list[Predictor]:
         shared = len(self.kernels) == 1
         groups = [range(self.A.shape[1])] if shared else [range(p, p + 1) for p in range(self.A.shape[1])]
-        return [
-            _predictor(covariance(kernel, self.X, self.U), self.A[:, group], self.W[:, group])
-            for kernel, group in zip(self.kernels, groups, strict=True)
-        ]
+        with one_blas_thread():
+            return [
+                _predictor(covariance(kernel, self.X, self.U), self.A[:, group], self.W[:, group])
+                for kernel, group in zip(self.kernels, groups, strict=True)
+            ]
 
     def arrays(self) -> dict[str, Array]:
         """Return inducing points, A and W."""
@@ -142,7 +143,8 @@ def fit_expert(model: GPModel, present: NDArray[np.int64], X: Array, weights: Ar
     """Infer the posterior of the classes `present` (P,) from their weights (n, P) at inputs X (n, D)."""
     kernels, m = _of_present(model, present)
     expert = SoftmaxExpert if model.inference == "softmax" else OneVsRest
-    return expert.fit(model, kernels, m, checked_inputs(X), weights)
+    with one_blas_thread():
+        return expert.fit(model, kernels, m, checked_inputs(X), weights)
 
 
 def restore_expert(

@@ -20,12 +20,15 @@ from semgp.errors import InputError
 from semgp.gp.covariance import Term
 from semgp.gp.fitc_predictor import FITCPredictor
 from semgp.gp.kernels import Array, Kernel, checked_inputs
-from semgp.parallel import n_workers, parallel_map, slices
+from semgp.parallel import parallel_map, slices
 
 ROUNDING = 1e-17
 """A column of V whose share in S is below this beside the identity cannot change S in double precision."""
-COLUMNS = 1000
-"""Training points a block of the gradient."""
+COLUMNS = 500
+"""Training points a block: what is computed of them stays in the processor's cache, and no array but V is large.
+
+Fresh memory is dear: touching 12 MB for the first time can take longer than the product that fills it.
+"""
 
 
 class FITCCovariance:
@@ -68,13 +71,13 @@ class FITCCovariance:
                 "the covariance of the inducing points is not positive definite: raise the jitter, or remove "
                 "inducing points that lie on top of each other."
             ) from error
-        blocks = list(slices(self.n, -(-self.n // n_workers())))
-        self.V = np.hstack(parallel_map(self._whitened, blocks))
+        self.V = np.empty((len(self.U), self.n))
+        parallel_map(self._whiten, slices(self.n, COLUMNS))
         self.D = kernel.diag(self.X) - np.einsum("mn,mn->n", self.V, self.V)
 
-    def _whitened(self, block: slice) -> Array:
+    def _whiten(self, block: slice) -> None:
         K_uf = self.kernel(self.U, self.X[block])
-        return np.asarray(solve_triangular(self.L, K_uf, lower=True, check_finite=False, overwrite_b=True))
+        self.V[:, block] = solve_triangular(self.L, K_uf, lower=True, check_finite=False, overwrite_b=True)
 
     def matvec(self, v: Array) -> Array:
         """Return K v for v (n,)."""
@@ -90,10 +93,13 @@ class FITCCovariance:
         V = self._V_single if rough else self.V
         root_T = np.sqrt(T).astype(V.dtype)
         # Saturated points (W ~ 0) are most of a class; leaving them out changes nothing and saves the time.
-        share = T * (self.kernel.diag(self.X) - self.D)
-        matter = np.flatnonzero(share > ROUNDING)
-        VT = V * root_T if len(matter) == self.n else V[:, matter] * root_T[matter]
-        S = VT @ VT.T
+        matter = np.flatnonzero(T * (self.kernel.diag(self.X) - self.D) > ROUNDING)
+        S = np.zeros((len(V), len(V)), dtype=V.dtype)
+        scratch = np.empty((len(V), 2 * COLUMNS), dtype=V.dtype)
+        for block in slices(len(matter), 2 * COLUMNS):
+            columns = block if len(matter) == self.n else matter[block]
+            VT = np.multiply(V[:, columns], root_T[columns], out=scratch[:, : block.stop - block.start])
+            S += VT @ VT.T
         S[np.diag_indices(len(S))] += 1
         try:
             return FITCFactor(V, self.D, W, T, np.linalg.cholesky(S))
@@ -115,21 +121,22 @@ class FITCCovariance:
         for term in terms:
             g += term.factor.R_diagonal() / 2 + term.a * (term.u - term.a / 2)
         VA, VU = self.V @ A, self.V @ U
-        M = np.empty_like(self.V)
 
-        def collect(block: slice) -> None:
-            part = (VU - VA) @ A[block].T / 2 + VA @ U[block].T / 2 - self.V[:, block] * g[block]
+        def share(block: slice) -> tuple[Array, Array]:
+            """Return tr(G0 P' dK_uf) and P G0 V' of some columns: M never exists as a whole."""
+            V = self.V[:, block]
+            M = (VU - VA) @ A[block].T / 2 + VA @ U[block].T / 2 - V * g[block]
+            scratch = np.empty_like(M)
             for term in terms:
-                part += term.factor.S_inverse_V[:, block] * (term.factor.T[block] / 2)
-            M[:, block] = part
+                M += np.multiply(
+                    np.matmul(term.factor.S_inverse, V, out=scratch), term.factor.T[block] / 2, out=scratch
+                )
+            H = solve_triangular(self.L, M, lower=True, trans=1, check_finite=False, overwrite_b=True)
+            return self.kernel.contract(self.U, self.X[block], H), H @ V.T
 
-        parallel_map(collect, slices(self.n, COLUMNS))
-        H = solve_triangular(self.L, M, lower=True, trans=1, check_finite=False)
-        HP = solve_triangular(self.L, (H @ self.V.T).T, lower=True, trans=1, check_finite=False)
-        parts = parallel_map(
-            lambda block: self.kernel.contract(self.U, self.X[block], H[:, block]), slices(self.n, COLUMNS)
-        )
-        gradient = 2 * np.sum(parts, axis=0) - self.kernel.contract(self.U, self.U, HP)
+        d_uf, HV = (sum(parts) for parts in zip(*parallel_map(share, slices(self.n, COLUMNS)), strict=True))
+        HP = solve_triangular(self.L, HV.T, lower=True, trans=1, check_finite=False)
+        gradient = 2 * d_uf - self.kernel.contract(self.U, self.U, HP)
         if not self.absolute_jitter:
             mean_weight = np.full(len(self.U), self.jitter * np.trace(HP) / len(self.U))
             gradient -= self.kernel.contract_diag(self.U, mean_weight)
@@ -159,15 +166,22 @@ class FITCFactor:
         return float(2 * np.log(np.diag(self.L)).sum() + np.log1p(self.D * self.W).sum())
 
     @cached_property
-    def S_inverse_V(self) -> Array:
-        """S^-1 V (m, n)."""
+    def S_inverse(self) -> Array:
+        """S^-1 (m, m)."""
         L_inverse = _inverse(self.L)
-        return np.asarray((L_inverse.T @ L_inverse) @ self.V)
+        return np.asarray(L_inverse.T @ L_inverse)
 
     @cached_property
     def _v_S_inverse_v(self) -> Array:
-        """v' S^-1 v for each column v of V, shape (n,)."""
-        return np.asarray(np.einsum("mn,mn->n", self.V, self.S_inverse_V))
+        """v' S^-1 v for each column v of V, shape (n,), block by block: S^-1 V is as large as V."""
+        squares = np.empty(self.V.shape[1])
+        scratch = np.empty((len(self.V), COLUMNS))
+        for block in slices(self.V.shape[1], COLUMNS):
+            V = self.V[:, block]
+            np.einsum(
+                "mn,mn->n", V, np.matmul(self.S_inverse, V, out=scratch[:, : V.shape[1]]), out=squares[block]
+            )
+        return squares
 
     def solve(self, v: Array) -> Array:
         """Return R v = T v - T V' S^-1 V T v for v (n,)."""

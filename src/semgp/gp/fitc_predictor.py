@@ -15,7 +15,7 @@ from semgp.parallel import parallel_map, slices
 
 BLOCK = 512
 """Query points a block: their covariances with a few hundred inducing points stay in the processor's cache."""
-PANELS = 4
+PANELS = 8
 """A product with a triangular matrix is taken in so many column panels, each without its rows of zeros."""
 
 

@@ -17,6 +17,7 @@ from semgp.gp.covariance import Covariance, F
 from semgp.gp.kernels import Array, Kernel
 from semgp.gp.likelihoods import Likelihood
 from semgp.gp.one_vs_rest import class_posteriors, nlml_gradient
+from semgp.parallel import one_blas_thread
 
 Objective = Callable[[Array], tuple[float, Array]]
 Progress = Callable[[int, float], None]
@@ -179,7 +180,8 @@ def learn(
     runs = []
     for start in (first, *draws):
         starts = None
-        runs.append(_search(objective, np.clip(start, *limits.T), limits, max_iterations))
+        with one_blas_thread():
+            runs.append(_search(objective, np.clip(start, *limits.T), limits, max_iterations))
     best = min(runs, key=lambda run: float(run.fun))
     chosen = kernel.with_theta(best.x[:n_theta])
     nlml = float(best.fun) - (prior(chosen)[0] if prior else 0.0)

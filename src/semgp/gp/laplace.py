@@ -16,6 +16,8 @@ from semgp.gp.likelihoods import Derivatives, Likelihood
 
 LONGEST_STEP = 16.0
 """At large signal deviations full Newton steps are too short; the line search may go this much further."""
+ROUGH_STEPS, NEAR = 20, 1e-3
+"""Single precision serves for so many steps, unless progress ends once the squared decrement is this small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,7 @@ def laplace(
         step = residual - K.factorise(-d.d2, rough).solve(K.matvec(residual))
         K_step = K.matvec(step)
         last, decrement = decrement, float(K_step @ residual)
-        if rough and (decrement < 0 or 0.1 * last < decrement < 1):
+        if rough and (decrement < 0 or iterations == ROUGH_STEPS or 0.1 * last < decrement < NEAR):
             rough = False  # single precision is at its end
             continue
         converged = decrement <= tolerance

@@ -142,7 +142,7 @@ class Matern52(Stationary):
     def g(r2: Array) -> Array:
         t = np.sqrt(np.multiply(r2, 5, out=r2), out=r2)
         e = np.exp(-t)
-        e *= _one_t_t2_third(t)
+        _times_one_t_t2_third(e, t)
         return e
 
     @staticmethod
@@ -163,13 +163,13 @@ class SquaredExponential(Stationary):
         return SquaredExponential.g(r2)
 
 
-def _one_t_t2_third(t: Array) -> Array:
-    """Overwrite t by 1 + t + t^2 / 3."""
-    t2 = t * t
-    t2 /= 3
-    t += 1
-    t += t2
-    return t
+@njit(cache=True, nogil=True)
+def _times_one_t_t2_third(e: Array, t: Array) -> None:
+    """Multiply e by 1 + t + t^2 / 3, in place."""
+    third = t.dtype.type(1 / 3)
+    for i in range(t.shape[0]):
+        for j in range(t.shape[1]):
+            e[i, j] *= 1 + t[i, j] * (1 + t[i, j] * third)
 
 
 @njit(cache=True, nogil=True)
