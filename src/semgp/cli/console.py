@@ -17,7 +17,7 @@ from rich.table import Table
 from semgp.errors import InputError
 from semgp.writers import atomic_write
 
-STDOUT = Console(width=None if sys.stdout.isatty() else 110)
+STDOUT = Console(width=None if sys.stdout.isatty() else 124)
 STDERR = Console(stderr=True)
 
 
@@ -53,8 +53,9 @@ def score_table(title: str, rows: Sequence[dict[str, Any]], columns: Sequence[st
     for name in columns:
         justify: Literal["left", "right"] = "left" if name in ("frame", "method") else "right"
         table.add_column(HEADINGS.get(name, name), justify=justify, no_wrap=True)
-    for row in rows:
-        table.add_row(*(_cell(name, row.get(name)) for name in columns), end_section=row.get("frame") == "mean")
+    for row, following in zip(rows, [*rows[1:], None], strict=True):
+        means_follow = following is not None and row.get("frame") != following.get("frame") == "mean"
+        table.add_row(*(_cell(name, row.get(name)) for name in columns), end_section=means_follow)
     return table
 
 

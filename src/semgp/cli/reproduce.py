@@ -131,8 +131,11 @@ def semantickitti(
 def _run(tasks: Iterable[Any], methods: Mapping[str, Method], quiet: bool, **drawing: Any) -> Experiment:
     """Run an experiment with progress."""
     from semgp.cli.console import progress
+    from semgp.evaluation.curves import require_matplotlib
     from semgp.evaluation.experiment import run_experiment
 
+    if drawing.get("view") is not None:
+        require_matplotlib()
     with progress(quiet) as bars:
         bar = bars.add_task("", total=None)
 

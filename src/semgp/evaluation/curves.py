@@ -160,12 +160,25 @@ def _by_method(results: Iterable[Result]) -> dict[str, list[Result]]:
     return methods
 
 
-def _canvas(width: float, height: float) -> Canvas:
-    """An empty matplotlib figure of a size in inches, apart from pyplot and its state."""
+def require_matplotlib() -> None:
+    """Check that curves can be drawn, before an experiment whose report needs them is run.
+
+    Raises
+    ------
+    MissingExtraError
+        The extra `figures` is not installed.
+    """
     try:
-        from matplotlib.figure import Figure as Canvas
+        import matplotlib.figure  # noqa: F401
     except ImportError as error:
         raise MissingExtraError("drawing curves", "figures") from error
+
+
+def _canvas(width: float, height: float) -> Canvas:
+    """An empty matplotlib figure of a size in inches, apart from pyplot and its state."""
+    require_matplotlib()
+    from matplotlib.figure import Figure as Canvas
+
     return Canvas(figsize=(width, height), dpi=DOTS_PER_INCH, layout="constrained")
 
 
