@@ -26,7 +26,7 @@ from semgp.gp.kernels import Array
 from semgp.gp.laplace import laplace
 from semgp.gp.likelihoods import Logistic, Probit
 from semgp.gp.one_vs_rest import binary_targets, class_posteriors, nlml_gradient
-from semgp.gp.probability import RULES
+from semgp.gp.probability import class_probability
 from semgp.gp.stationary import Matern52
 from semgp.scene.scan import synthetic_room
 from semgp.scene.sensor import DepthCamera
@@ -85,7 +85,8 @@ def main() -> None:
 
     def predict() -> object:
         mean, variance = predictor(queries)
-        return RULES["softmax"](Probit(), mean + m, variance)
+        mean += m
+        return class_probability("softmax", Probit(), mean, variance)
 
     results[f"{len(queries):,} queries: mean, variance, probability"] = best_of(predict, options.repeats)
 

@@ -22,7 +22,7 @@ from semgp.gp.kernels import Array, Kernel, checked_inputs
 from semgp.gp.likelihoods import LIKELIHOODS
 from semgp.gp.model import GPModel
 from semgp.gp.one_vs_rest import binary_targets, class_posteriors
-from semgp.gp.probability import RULES
+from semgp.gp.probability import class_probability
 from semgp.gp.softmax_expert import SoftmaxExpert
 from semgp.parallel import one_blas_thread, parallel_map
 
@@ -99,9 +99,10 @@ class OneVsRest:
     def predict(self, X: Array) -> tuple[Array, Array, Array]:
         """Return probability, latent mean and latent variance, each (M, P), at inputs X (M, D)."""
         parts = [predictor(X) for predictor in self._predictors]
-        mean = np.hstack([part[0] for part in parts]) + self.m
-        variance = np.hstack([part[1] for part in parts])
-        return RULES[self.model.rule](LIKELIHOODS[self.model.likelihood], mean, variance), mean, variance
+        mean, variance = parts[0] if len(parts) == 1 else map(np.hstack, zip(*parts, strict=True))
+        mean += self.m
+        p = class_probability(self.model.rule, LIKELIHOODS[self.model.likelihood], mean, variance)
+        return p, mean, variance
 
     @cached_property
     def _predictors(self) -> list[Predictor]:

@@ -20,6 +20,7 @@ from semgp.errors import InputError
 from semgp.gp.covariance import Term
 from semgp.gp.fitc_predictor import FITCPredictor
 from semgp.gp.kernels import Array, Kernel, checked_inputs
+from semgp.gp.triangular import inverse, solve_lower, solve_lower_transposed
 from semgp.parallel import parallel_map, slices
 
 ROUNDING = 1e-17
@@ -146,8 +147,10 @@ class FITCCovariance:
         """Return what predicts for the posteriors of the terms."""
         A = np.column_stack([term.a for term in terms])
         beta = solve_triangular(self.L, self.V @ A, lower=True, trans=1)
-        roots = np.stack([_inverse(term.factor.L).T for term in terms], axis=1)
-        return FITCPredictor(self.kernel, self.U, _inverse(self.L).T, beta, roots.astype(np.float32))
+        roots = np.stack([inverse(term.factor.L).T for term in terms], axis=1)
+        return FITCPredictor(
+            self.kernel, self.U, inverse(np.ascontiguousarray(self.L)).T, beta, roots.astype(np.float32)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +171,7 @@ class FITCFactor:
     @cached_property
     def S_inverse(self) -> Array:
         """S^-1 (m, m)."""
-        L_inverse = _inverse(self.L)
+        L_inverse = inverse(self.L)
         return np.asarray(L_inverse.T @ L_inverse)
 
     @cached_property
@@ -186,10 +189,8 @@ class FITCFactor:
     def solve(self, v: Array) -> Array:
         """Return R v = T v - T V' S^-1 V T v for v (n,)."""
         Tv = self.T * v
-        half = solve_triangular(self.L, self.V @ Tv.astype(self.V.dtype), lower=True, check_finite=False)
-        return np.asarray(
-            Tv - self.T * (solve_triangular(self.L, half, lower=True, trans=1, check_finite=False) @ self.V)
-        )
+        half = solve_lower(self.L, self.V @ Tv.astype(self.V.dtype))
+        return np.asarray(Tv - self.T * (solve_lower_transposed(self.L, half) @ self.V))
 
     def R_diagonal(self) -> Array:
         """Return the diagonal (n,) of R."""
@@ -202,8 +203,3 @@ class FITCFactor:
         """
         shrink = 1 / (1 + self.D * self.W)
         return shrink * self.D + shrink**2 * self._v_S_inverse_v
-
-
-def _inverse(L: Array) -> Array:
-    """Return the inverse of a lower-triangular matrix."""
-    return np.asarray(solve_triangular(L, np.eye(len(L)), lower=True, check_finite=False))

@@ -19,6 +19,10 @@ from scipy.special import softmax
 
 from semgp.gp.kernels import Array
 from semgp.gp.likelihoods import Likelihood
+from semgp.parallel import parallel_map, slices
+
+BLOCK = 8192
+"""Points a block."""
 
 
 def averaged(likelihood: Likelihood, mean: Array, variance: Array) -> Array:
@@ -38,6 +42,17 @@ def plug_in(likelihood: Likelihood, mean: Array, variance: Array) -> Array:
 def softmax_of_means(likelihood: Likelihood, mean: Array, variance: Array) -> Array:
     """Return the softmax of the means, (M, C)."""
     return np.asarray(softmax(mean, axis=1))
+
+
+def class_probability(rule: str, likelihood: Likelihood, mean: Array, variance: Array) -> Array:
+    """Return class probabilities (M, C) by the rule of that name, block by block on all cores."""
+    probability = np.empty_like(mean)
+
+    def fill(rows: slice) -> None:
+        probability[rows] = RULES[rule](likelihood, mean[rows], variance[rows])
+
+    parallel_map(fill, slices(len(mean), BLOCK))
+    return probability
 
 
 RULES: dict[str, Callable[[Likelihood, Array, Array], Array]] = {
