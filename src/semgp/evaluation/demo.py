@@ -57,6 +57,15 @@ METHODS: Mapping[str, Method] = {
 """The methods by name, the GP first."""
 
 
+def warm_up(task: Task) -> None:
+    """Run the rivals and the drawing on a few points, so that compilation is not timed with the real ones."""
+    few = replace(task, training=(task.training[0][::500],), truth=task.truth[::500])
+    for name in list(METHODS)[1:]:
+        METHODS[name](few).semantic_map.query(few.truth.points)
+    points = few.truth.points
+    splat(points, by_class(few.truth.hard_labels, few.truth.classes), view_of(points, few.truth.origin))
+
+
 def demo_pictures(scan: SyntheticScan, prediction: Prediction) -> dict[str, NDArray[np.uint8]]:
     """Return the pictures by name: truth, input, GP map, its uncertainty, and all four as one overview."""
     points, classes = scan.truth.points, scan.truth.classes

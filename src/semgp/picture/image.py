@@ -42,4 +42,4 @@ def save_png(path: str | Path, image: Picture) -> None:
     if Path(path).suffix.lower() != ".png":
         raise InputError(f"{path}: the name of a PNG file ends in .png.")
     with atomic_write(path) as temporary:
-        picture.save(temporary, format="PNG", optimize=True)
+        picture.save(temporary, format="PNG", compress_level=6)
