@@ -24,7 +24,7 @@ from semgp.picture.view import view_of
 from semgp.prediction import Prediction
 from semgp.scene.scan import SyntheticScan, synthetic_room
 
-MODEL = GPModel(max_points=3000, n_inducing=150, inducing="farthest")
+MODEL = GPModel(max_points=2000, n_inducing=150, inducing="farthest")
 """Smaller than the paper's, to stay quick."""
 BOUNDS = Bounds(ell=(0.05, 5), sf=(0.1, 10))
 
@@ -36,7 +36,7 @@ def demo_task(seed: int) -> tuple[SyntheticScan, Task]:
 
 
 def _gp(task: Task) -> Built:
-    model, _ = learn_model(task.small, replace(MODEL, seed=task.seed), bounds=BOUNDS, max_iterations=10)
+    model, _ = learn_model(task.small, replace(MODEL, seed=task.seed), bounds=BOUNDS, max_iterations=8)
     gp_map = GPSemanticMap(task.truth.classes, model)
     gp_map.update(task.small)
     gp_map.solve()
