@@ -15,7 +15,7 @@ from semgp.gp.covariance import Covariance, F, Term
 from semgp.gp.kernels import Array
 from semgp.gp.laplace import Laplace, gradient_in_mean, laplace, starting_point
 from semgp.gp.likelihoods import Likelihood
-from semgp.parallel import parallel_map
+from semgp.parallel import one_blas_thread, parallel_map
 
 
 def binary_targets(weights: Array) -> Array:
@@ -50,7 +50,8 @@ def class_posteriors(
     starts : sequence of (n,) arrays, optional
         Where Newton's method starts for each class.
     """
-    points = starting_point(K, Y, m) if starts is None else starts
+    with one_blas_thread():
+        points = starting_point(K, Y, m) if starts is None else starts
 
     def posterior(c: int) -> Laplace[F]:
         return laplace(K, likelihood, Y[:, c], m[c], points[c])
@@ -61,4 +62,5 @@ def class_posteriors(
 def nlml_gradient(K: Covariance[F], posteriors: Sequence[Laplace[F]]) -> tuple[Array, Array, list[Term[F]]]:
     """Return the gradient of the summed NLML in theta (P,) and in each class's mean (C,), and the terms."""
     terms = parallel_map(lambda posterior: posterior.term(K), posteriors)
-    return K.gradient(terms), np.array([gradient_in_mean(term) for term in terms]), terms
+    with one_blas_thread():
+        return K.gradient(terms), np.array([gradient_in_mean(term) for term in terms]), terms
