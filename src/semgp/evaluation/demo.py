@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from semgp.baselines.bki import BKIMap
 from semgp.baselines.knn import KNNMap
-from semgp.evaluation.task import Built, Method, Task
+from semgp.evaluation.task import Built, Method, Task, of_all
 from semgp.gp.hyperparameters import Bounds
 from semgp.gp.model import GPModel
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.learning import learn_model
-from semgp.maps.protocol import SemanticMap
 from semgp.octomap import SemanticOctoMap
 from semgp.picture.colour import by_class, by_value
 from semgp.picture.compose import colour_bar, legend, panels, stack
@@ -43,16 +42,11 @@ def _gp(task: Task) -> Built:
     return Built(gp_map, len(task.small))
 
 
-def _of_all(semantic_map: SemanticMap, task: Task) -> Built:
-    semantic_map.update(task.training[0])
-    return Built(semantic_map, int(task.training[0].labelled.sum()))
-
-
 METHODS: Mapping[str, Method] = {
     "GP map": _gp,
-    "k-NN": lambda task: _of_all(KNNMap(task.truth.classes), task),
-    "OctoMap": lambda task: _of_all(SemanticOctoMap(task.truth.classes, resolution=0.1), task),
-    "BKI": lambda task: _of_all(BKIMap(task.truth.classes, resolution=0.05, ell=0.15), task),
+    "k-NN": lambda task: of_all(KNNMap(task.truth.classes), task),
+    "OctoMap": lambda task: of_all(SemanticOctoMap(task.truth.classes, resolution=0.1), task),
+    "BKI": lambda task: of_all(BKIMap(task.truth.classes, resolution=0.05, ell=0.15), task),
 }
 """The methods by name, the GP first."""
 

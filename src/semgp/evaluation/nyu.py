@@ -17,7 +17,7 @@ from semgp.baselines.csm import CSMMap
 from semgp.baselines.knn import KNNMap
 from semgp.errors import InputError
 from semgp.evaluation.measure import timed
-from semgp.evaluation.task import Built, Method, Task
+from semgp.evaluation.task import Built, Method, Task, of_all
 from semgp.gp.hyperparameters import Bounds
 from semgp.gp.model import GPModel
 from semgp.gp.stationary import Matern52
@@ -104,13 +104,6 @@ def _gpsm(task: Task, rule: str) -> Built:
     return Built(gp_map, len(task.small), learning_seconds + seconds)
 
 
-def _of_all(semantic_map: SemanticMap, task: Task) -> Built:
-    """A map of every labelled point of every scan."""
-    for cloud in task.training:
-        semantic_map.update(cloud)
-    return Built(semantic_map, sum(int(cloud.labelled.sum()) for cloud in task.training))
-
-
 def _of_small(semantic_map: SemanticMap, task: Task) -> Built:
     """A map of the points that the GP gets."""
     semantic_map.update(task.small)
@@ -120,18 +113,18 @@ def _of_small(semantic_map: SemanticMap, task: Task) -> Built:
 def _knn_256(task: Task) -> Built:
     """Many neighbours of every seventh labelled point: the strongest vote on network labels."""
     thinned = [cloud[cloud.labelled][::7] for cloud in task.training]
-    return _of_all(KNNMap(task.truth.classes, k=256, width=0.05), replace(task, training=tuple(thinned)))
+    return of_all(KNNMap(task.truth.classes, k=256, width=0.05), replace(task, training=tuple(thinned)))
 
 
 METHODS: Mapping[str, Method] = {
     "gpsm": lambda task: _gpsm(task, "softmax"),
     "gpsm-averaged": lambda task: _gpsm(task, "averaged"),
     "knn": lambda task: _of_small(KNNMap(task.truth.classes, k=8, width=0.02), task),
-    "knn-all": lambda task: _of_all(KNNMap(task.truth.classes, k=8, width=0.02), task),
-    "1nn-all": lambda task: _of_all(KNNMap(task.truth.classes, k=1), task),
+    "knn-all": lambda task: of_all(KNNMap(task.truth.classes, k=8, width=0.02), task),
+    "1nn-all": lambda task: of_all(KNNMap(task.truth.classes, k=1), task),
     "knn-256": _knn_256,
-    "octomap": lambda task: _of_all(SemanticOctoMap(task.truth.classes, resolution=0.02), task),
-    "csm": lambda task: _of_all(CSMMap(task.truth.classes, resolution=0.02), task),
-    "bki": lambda task: _of_all(BKIMap(task.truth.classes, resolution=0.02, ell=0.1), task),
+    "octomap": lambda task: of_all(SemanticOctoMap(task.truth.classes, resolution=0.02), task),
+    "csm": lambda task: of_all(CSMMap(task.truth.classes, resolution=0.02), task),
+    "bki": lambda task: of_all(BKIMap(task.truth.classes, resolution=0.02, ell=0.1), task),
 }
 """The methods by name."""

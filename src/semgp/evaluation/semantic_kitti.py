@@ -18,8 +18,7 @@ from semgp.baselines.csm import CSMMap
 from semgp.baselines.knn import KNNMap
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.evaluation.task import Built, Method, Task
-from semgp.maps.protocol import SemanticMap
+from semgp.evaluation.task import Method, Task, of_all
 from semgp.octomap import SemanticOctoMap
 from semgp.readers import SemanticKITTISequence
 
@@ -92,20 +91,13 @@ def _joined(clouds: list[LabelledCloud]) -> LabelledCloud:
     return replace(clouds[0], points=points, labels=labels, features=None, feature_names=())
 
 
-def _of_all(semantic_map: SemanticMap, task: Task) -> Built:
-    """A map of every labelled point of every scan."""
-    for cloud in task.training:
-        semantic_map.update(cloud)
-    return Built(semantic_map, sum(int(cloud.labelled.sum()) for cloud in task.training))
-
-
 METHODS: Mapping[str, Method] = {
-    "labels": lambda task: _of_all(KNNMap(task.truth.classes, k=1), task),
-    "csm": lambda task: _of_all(CSMMap(task.truth.classes, resolution=0.3, alpha0=0.001), task),
-    "bki": lambda task: _of_all(BKIMap(task.truth.classes, resolution=0.2, ell=0.5), task),
-    "bki-wide": lambda task: _of_all(BKIMap(task.truth.classes, resolution=0.2, ell=2.0), task),
-    "knn": lambda task: _of_all(KNNMap(task.truth.classes, k=15, width=0.3, kernel="gauss", alpha0=0.001), task),
-    "octomap": lambda task: _of_all(SemanticOctoMap(task.truth.classes, resolution=0.3), task),
+    "labels": lambda task: of_all(KNNMap(task.truth.classes, k=1), task),
+    "csm": lambda task: of_all(CSMMap(task.truth.classes, resolution=0.3, alpha0=0.001), task),
+    "bki": lambda task: of_all(BKIMap(task.truth.classes, resolution=0.2, ell=0.5), task),
+    "bki-wide": lambda task: of_all(BKIMap(task.truth.classes, resolution=0.2, ell=2.0), task),
+    "knn": lambda task: of_all(KNNMap(task.truth.classes, k=15, width=0.3, kernel="gauss", alpha0=0.001), task),
+    "octomap": lambda task: of_all(SemanticOctoMap(task.truth.classes, resolution=0.3), task),
 }
 """The methods by name. `labels` repeats the nearest label: where all points are kept, the network's own.
 `bki-wide` is S-BKI for sparse labels: with 1 % of the points the kernel of `bki` reaches 88 % of the queries, this

@@ -71,6 +71,13 @@ class Built:
     fit_seconds: float | None = None
 
 
+def of_all(semantic_map: SemanticMap, task: Task) -> Built:
+    """Update a map with every scan of a task."""
+    for cloud in task.training:
+        semantic_map.update(cloud)
+    return Built(semantic_map, sum(int(cloud.labelled.sum()) for cloud in task.training))
+
+
 Method = Callable[[Task], Built]
 """Builds a method's map for a task."""
 

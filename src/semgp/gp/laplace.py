@@ -13,9 +13,8 @@ import numpy as np
 from semgp.gp.covariance import Covariance, F, Term
 from semgp.gp.kernels import Array
 from semgp.gp.likelihoods import Derivatives, Likelihood
+from semgp.gp.line_search import line_search
 
-LONGEST_STEP = 16.0
-"""At large signal deviations full Newton steps are too short; the line search may go this much further."""
 ROUGH_STEPS, NEAR = 20, 1e-3
 """Single precision serves for so many steps, unless progress ends once the squared decrement is this small."""
 
@@ -100,7 +99,7 @@ def laplace(
             rough = False  # single precision is at its end
             continue
         converged = decrement <= tolerance
-        length, d = _line_search(likelihood, y, Ka + m, K_step, d, float(step @ Ka), float(step @ K_step))
+        length, d = _along(likelihood, y, Ka + m, K_step, d, float(step @ Ka), float(step @ K_step))
         a = a + length * step
         Ka = Ka + length * K_step
         iterations += 1
@@ -121,22 +120,16 @@ def starting_point(K: Covariance[F], Y: Array, m: Array) -> list[Array]:
     return [unit.solve(4 * Y[:, c] - m[c]) for c in range(Y.shape[1])]
 
 
-def _line_search(
+def _along(
     likelihood: Likelihood, y: Array, f: Array, K_step: Array, d: Derivatives, sKa: float, sKs: float
 ) -> tuple[float, Derivatives]:
-    """Minimise psi(t), convex, along a step; return t and the derivatives of the likelihood there.
+    """Minimise psi along a step; return its length and the derivatives of the likelihood there.
 
-    psi(t) = (a + t s)' K (a + t s) / 2 - sum log p(y | f + t K s), by Newton's method kept inside a bracket.
+    psi(t) = (a + t s)' K (a + t s) / 2 - sum log p(y | f + t K s).
     """
-    start = sKa - float(d.d1 @ K_step)
-    low, high, t = 0.0, LONGEST_STEP, 1.0
-    for _ in range(20):
+
+    def at(t: float) -> tuple[float, float, Derivatives]:
         d = likelihood.derivatives(y, f + t * K_step)
-        slope = sKa + t * sKs - float(d.d1 @ K_step)
-        if abs(slope) <= 0.1 * abs(start):
-            break
-        low, high = (t, high) if slope < 0 else (low, t)
-        t -= slope / (sKs - float(d.d2 @ K_step**2))
-        if not low < t < high:
-            t = 0.5 * (low + high)
-    return t, d
+        return sKa + t * sKs - float(d.d1 @ K_step), sKs - float(d.d2 @ K_step**2), d
+
+    return line_search(sKa - float(d.d1 @ K_step), at)

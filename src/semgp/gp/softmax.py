@@ -14,6 +14,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.special import log_softmax, softmax
 
 from semgp.gp.kernels import Array, Kernel, checked_inputs
+from semgp.gp.line_search import line_search
 from semgp.parallel import parallel_map
 
 
@@ -97,7 +98,7 @@ def softmax_laplace(
         K_step = _apply(K, step)
         decrement = float(np.vdot(K_step, residual))
         converged = decrement <= tolerance
-        length = _line_search(y, f, a, f - m[:, None], step, K_step)
+        length = _along(y, f, f - m[:, None], step, K_step)
         a = a + length * step
         f = f + length * K_step
         iterations += 1
@@ -143,22 +144,17 @@ def _solve(E: Array, L: Array, v: Array) -> Array:
     return np.asarray(Ev - E @ cho_solve((L, True), Ev.sum(axis=0), check_finite=False))
 
 
-def _line_search(y: Array, f: Array, a: Array, Ka: Array, step: Array, K_step: Array) -> float:
-    """Minimise the convex psi(t) along a step by Newton's method kept inside a bracket; return t."""
+def _along(y: Array, f: Array, Ka: Array, step: Array, K_step: Array) -> float:
+    """Minimise psi(t) = (a + t s)' K (a + t s) / 2 - sum log p(y | f + t K s) along a step; return its length."""
     sKa, sKs = float(np.vdot(step, Ka)), float(np.vdot(step, K_step))
-    start = sKa - float(np.vdot(y - softmax(f, axis=0), K_step))
-    low, high, t = 0.0, 16.0, 1.0
-    for _ in range(20):
+
+    def at(t: float) -> tuple[float, float, None]:
         pi = softmax(f + t * K_step, axis=0)
-        slope = sKa + t * sKs - float(np.vdot(y - pi, K_step))
-        if abs(slope) <= 0.1 * abs(start):
-            break
-        low, high = (t, high) if slope < 0 else (low, t)
         mean = (pi * K_step).sum(axis=0)
-        t -= slope / (sKs + float(np.vdot(pi, (K_step - mean) ** 2)))
-        if not low < t < high:
-            t = 0.5 * (low + high)
-    return t
+        curvature = sKs + float(np.vdot(pi, (K_step - mean) ** 2))
+        return sKa + t * sKs - float(np.vdot(y - pi, K_step)), curvature, None
+
+    return line_search(sKa - float(np.vdot(y - softmax(f, axis=0), K_step)), at)[0]
 
 
 def softmax_gradient(posterior: SoftmaxLaplace) -> tuple[list[Array], Array]:
