@@ -109,6 +109,16 @@ class VoxelTable:
         """Key (V,) of each row."""
         return self._keys[: self._n]
 
+    @property
+    def slots(self) -> NDArray[np.int64]:
+        """The hash table, for compiled code: see `slot_of`."""
+        return self._slots
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of keys and hash table."""
+        return self._keys.nbytes + self._slots.nbytes
+
     def insert(self, keys: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the row (N,) of each key; keys not met before get new rows."""
         needed = self._n + len(keys)

@@ -1,0 +1,172 @@
+"""The blocks' answers: latent means and variance at the points of each block, turned into probabilities."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgp.blocks.covariance import Mixture, covariance_tile
+from semgp.blocks.link import Link, class_probabilities
+from semgp.blocks.pairs import Pairs
+from semgp.blocks.solve import SHARED, Solved
+
+F32, I64 = NDArray[np.float32], NDArray[np.int64]
+
+TILE = 64
+"""Points that are answered together: their covariances with a block stay in the cache."""
+
+
+class Answers(NamedTuple):
+    """What is added up: probability (M, C), mean (M, C) and variance (M,)."""
+
+    probability: F32
+    mean: F32
+    variance: F32
+
+
+@njit(cache=True, nogil=True)
+def answer_pairs(
+    solved: Solved,
+    first_block: int,
+    pairs: Pairs,
+    order: I64,
+    features: F32,
+    kernel: Mixture,
+    link: Link,
+    answers: Answers,
+) -> None:
+    """Add the answers to some pairs, sorted by block, all of blocks in `solved`.
+
+    Parameters
+    ----------
+    solved : Solved
+        Posteriors; its first block has the number `first_block`.
+    first_block : int
+        See `solved`.
+    pairs : Pairs
+        All pairs.
+    order : (n,) array
+        The pairs to answer, by block; no point occurs twice.
+    features : (M, F) array
+        The points' inputs beyond position; a row of NaN takes the features of the block's nearest member.
+    kernel : Mixture
+        The covariance function.
+    link : Link
+        From latent values to probabilities.
+    answers : Answers
+        Where to add.
+    """
+    D, T = solved.X.shape[1], solved.X.shape[2]
+    most = SHARED + 3 * solved.present.shape[1]
+    X, work = np.empty((D, TILE), np.float32), np.empty(TILE, np.float32)
+    K_flat, V_flat = np.empty(T * TILE, np.float32), np.empty(T * TILE, np.float32)
+    F_flat, p_flat = np.empty(most * TILE, np.float32), np.empty(most * TILE, np.float32)
+    prior_variance = np.float32(0)
+    for k in range(len(kernel.variance)):
+        prior_variance += kernel.variance[k]
+    begin = 0
+    while begin < len(order):
+        number = pairs.block[order[begin]]
+        end = begin + 1
+        while end < len(order) and end - begin < TILE and pairs.block[order[end]] == number:
+            end += 1
+        m, b = end - begin, number - first_block
+        n, P = solved.n[b], solved.n_present[b]
+        W = SHARED + 3 * P
+        Z = solved.X[b]
+        for q in range(m):
+            pair = order[begin + q]
+            for d in range(3):
+                X[d, q] = pairs.local[pair, d]
+            if D > 3:
+                _fill_features(X, q, features[pairs.point[pair]], Z, n)
+        K = K_flat[: n * m].reshape(n, m)
+        covariance_tile(Z, n, X, m, kernel, K, work)
+        F = F_flat[: W * m].reshape(W, m)
+        np.dot(solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n), K, F)
+        for q in range(m):
+            work[q] = prior_variance
+        if solved.at_factor[b + 1] > solved.at_factor[b]:
+            V = V_flat[: n * m].reshape(n, m)
+            np.dot(solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]].reshape(n, n), K, V)
+            _subtract_squares(V, work, m)
+        else:
+            _explained_by_vote(F[2 + 2 * P], prior_variance, link.v_0, work, m)
+        p = p_flat[: (P + 1) * m].reshape(P + 1, m)
+        class_probabilities(F, solved.present[b, :P], m, link, p)
+        _add(pairs, order, begin, m, solved.present[b, :P], p, F, work, link, answers)
+        begin = end
+
+
+@njit(cache=True, nogil=True)
+def answer_prior(pairs: Pairs, order: I64, prior_variance: float, link: Link, answers: Answers) -> None:
+    """Add the prior for pairs without a block."""
+    for i in order:
+        point, w = pairs.point[i], pairs.weight[i]
+        for c in range(len(link.prior)):
+            answers.probability[point, c] += w * link.prior[c]
+            answers.mean[point, c] += w * link.prior[c]
+        answers.variance[point] += w * np.float32(prior_variance)
+
+
+@njit(cache=True, nogil=True)
+def _fill_features(X: F32, q: int, given: F32, Z: F32, n: int) -> None:
+    nearest, least = 0, np.float32(np.inf)
+    if np.isnan(given).any():
+        for j in range(n):
+            r2 = (X[0, q] - Z[0, j]) ** 2 + (X[1, q] - Z[1, j]) ** 2 + (X[2, q] - Z[2, j]) ** 2
+            if r2 < least:
+                nearest, least = j, r2
+    for f in range(len(given)):
+        X[3 + f, q] = Z[3 + f, nearest] if np.isnan(given[f]) else given[f]
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _subtract_squares(V: F32, variance: F32, m: int) -> None:
+    for j in range(V.shape[0]):
+        row = V[j]
+        for q in range(m):
+            variance[q] -= row[q] * row[q]
+    for q in range(m):
+        variance[q] = max(variance[q], np.float32(0))
+
+
+@njit(cache=True, nogil=True)
+def _explained_by_vote(mass: F32, prior_variance: np.float32, v_0: np.float32, variance: F32, m: int) -> None:
+    """Without a solve, the prior's share of the vote stands for what is not known."""
+    for q in range(m):
+        variance[q] = prior_variance * v_0 / (v_0 + mass[q])
+
+
+@njit(cache=True, nogil=True)
+def _add(
+    pairs: Pairs,
+    order: I64,
+    begin: int,
+    m: int,
+    present: NDArray[np.int16],
+    p: F32,
+    F: F32,
+    variance: F32,
+    link: Link,
+    answers: Answers,
+) -> None:
+    P = len(present)
+    for q in range(m):
+        pair = order[begin + q]
+        point, w = pairs.point[pair], pairs.weight[pair]
+        answers.variance[point] += w * variance[q]
+        out, mean = answers.probability[point], answers.mean[point]
+        absent, left = w * p[P, q], w * (1 - F[0, q])
+        k = 0
+        for c in range(len(link.prior)):
+            if k < P and present[k] == c:
+                out[c] += w * p[k, q]
+                mean[c] += w * (F[2 + k, q] + link.prior[c])
+                k += 1
+            else:
+                out[c] += absent * link.power[c]
+                mean[c] += left * link.prior[c]

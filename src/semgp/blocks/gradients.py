@@ -1,0 +1,133 @@
+"""Held-out log-loss of patches and its gradient in all parameters of the model, by the chain rule backwards.
+
+With F = Y A^-1 K_*, G = dL/dF, B = A^-1 K_* and H = (Y A^-1)^T G, the gradients are dL/dK_* = H, dL/dA = -H B^T and
+dL/dY = G B^T.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgp.blocks.covariance import Mixture, covariance_tile, derivative_tile
+from semgp.blocks.link import Link, class_probabilities
+from semgp.blocks.patches import Packed
+from semgp.blocks.solve import SHARED, Noise, solve_block
+
+F32, F64 = NDArray[np.float32], NDArray[np.float64]
+
+
+class Gradient(NamedTuple):
+    """Sums over patches: loss (1,), and derivatives in log length scales and log sf (Q, D + 1), s_n, nugget and a
+    (3,), and delta, v_0 and the three weights (5,); all but the kernel's are plain derivatives, not logarithmic."""
+
+    loss: F64
+    kernel: F64
+    noise: F64
+    link: F64
+
+
+@njit(cache=True, nogil=True)
+def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, link: Link, out: Gradient) -> None:
+    """Add the mean log-loss of each patch's held-out labels, and its derivatives, to `out`."""
+    n_most, m_most = patches.sizes[:, 0].max(), patches.sizes[:, 2].max()
+    W_most, wide = SHARED + 3 * patches.sizes[:, 1].max(), max(n_most, m_most)
+    K, factor = np.empty(n_most * wide, np.float32), np.empty(n_most * n_most, np.float32)
+    rows_flat, G_flat = np.empty(W_most * n_most, np.float32), np.empty(W_most * m_most, np.float32)
+    F_flat, p_flat, work = np.empty_like(G_flat), np.empty_like(G_flat), np.empty(wide, np.float32)
+    at_X = at_k = at_present = at_mass = at_Y = at_label = 0
+    for b in range(len(patches.sizes)):
+        n, P, m = patches.sizes[b, 0], patches.sizes[b, 1], patches.sizes[b, 2]
+        X = patches.X[at_X : at_X + n_dims * n].reshape(n_dims, n)
+        Y = patches.Y[at_Y : at_Y + n_dims * m].reshape(n_dims, m)
+        k, label = patches.k[at_k : at_k + n], patches.label[at_label : at_label + m]
+        present = patches.present[at_present : at_present + P]
+        W = SHARED + 3 * P
+        rows = rows_flat[: W * n].reshape(W, n)
+        rows[SHARED + 2 * P :] = patches.mass[at_mass : at_mass + P * n].reshape(P, n)
+        rows[2 + 2 * P] = 0
+        for p in range(P):
+            rows[2 + 2 * P] += rows[SHARED + 2 * P + p]
+        L_inverse = factor[: n * n].reshape(n, n)
+        if noise.solve:
+            solve_block(X, k, n, present, kernel, noise, rows, L_inverse, K, work)
+        else:
+            rows[: 2 + 2 * P] = 0
+        cross = K[: n * m].reshape(n, m)
+        covariance_tile(X, n, Y, m, kernel, cross, work)
+        F, G = F_flat[: W * m].reshape(W, m), G_flat[: W * m].reshape(W, m)
+        np.dot(rows, cross, F)
+        prob = p_flat[: (P + 1) * m].reshape(P + 1, m)
+        class_probabilities(F, present, m, link, prob)
+        out.loss[0] += _link_gradient(F, prob, present, label, link, G, out.link)
+        H = np.dot(np.ascontiguousarray(rows.T), G)
+        derivative_tile(X, n, Y, m, kernel, H, 1.0, out.kernel, work)
+        if noise.solve:
+            B = np.dot(L_inverse.T, np.dot(L_inverse, cross))
+            S = np.dot(H, np.ascontiguousarray(B.T))  # minus dL/dA
+            derivative_tile(X, n, X, n, kernel, S, -1.0, out.kernel, work)
+            G_rows = np.dot(G, np.ascontiguousarray(B.T))
+            _noise_gradient(S, G_rows, rows, k, present, noise, out.noise)
+        at_X, at_k, at_present = at_X + n_dims * n, at_k + n, at_present + P
+        at_mass, at_Y, at_label = at_mass + P * n, at_Y + n_dims * m, at_label + m
+
+
+@njit(cache=True, nogil=True)
+def _link_gradient(
+    F: F32, prob: F32, present: NDArray[np.int16], label: NDArray[np.int32], link: Link, G: F32, g: F64
+) -> float:
+    """Return the mean log-loss; fill in G = dL/dF and add the derivatives in the link's parameters to g."""
+    P, m = len(present), len(label)
+    prior, power, delta, v_0, w_i, w_l, w_v = link
+    place = np.full(len(prior), -1, np.int64)
+    for p in range(P):
+        place[present[p]] = p
+    G[:, :] = 0
+    loss = 0.0
+    for q in range(m):
+        y = label[q]
+        at = place[y]
+        loss -= np.log(max(prob[at, q] if at >= 0 else prob[P, q] * power[y], np.float32(1e-12)))
+        for c in range(len(prior)):
+            i = place[c] if place[c] >= 0 else P
+            pi = prior[c] if i < P else np.float32(1)
+            chance = prob[i, q] if i < P else prob[P, q] * power[c]
+            d = (chance - (1.0 if c == y else 0.0)) / m
+            if w_i > 0:
+                latent = F[2 + i, q] + pi if i < P else np.float32(1) - F[0, q]
+                inside = max(latent, np.float32(0)) + delta * pi
+                if latent > 0:
+                    G[2 + i if i < P else 0, q] += w_i * d / inside * (1 if i < P else -1)
+                g[0] += d * w_i * pi / inside
+                g[2] += d * (np.log(inside) + (0.0 if i < P else np.log(prior[c])))
+            if w_l > 0:
+                z = F[2 + P + i, q] if i < P else F[1, q]
+                G[2 + P + i if i < P else 1, q] += w_l * d
+                g[3] += d * (z + np.log(prior[c]))
+            if w_v > 0:
+                v = F[SHARED + 2 * P + i, q] if i < P else np.float32(0)
+                inside = v + v_0 * pi
+                if i < P:
+                    G[SHARED + 2 * P + i, q] += w_v * d / inside
+                g[1] += d * w_v * pi / inside
+                g[4] += d * (np.log(inside) + (0.0 if i < P else np.log(prior[c])))
+    return loss / m
+
+
+@njit(cache=True, nogil=True)
+def _noise_gradient(
+    S: F32, G_rows: F32, rows: F32, k: F32, present: NDArray[np.int16], noise: Noise, g: F64
+) -> None:
+    """Add the derivatives in s_n, nugget and a; S is minus dL/dA, G_rows is dL/dY."""
+    P, a = len(present), noise.a
+    for j in range(len(k)):
+        total = rows[2 + 2 * P, j]
+        g[0] -= S[j, j] / total
+        g[1] -= S[j, j] / k[j]
+        g[2] += G_rows[1, j] * (1 / a - 1 / (total + a))
+        for p in range(P):
+            mass, pi = rows[SHARED + 2 * P + p, j], noise.prior[present[p]]
+            g[2] += G_rows[2 + P + p, j] * (pi / (mass + a * pi) - 1 / (total + a))

@@ -1,0 +1,187 @@
+"""Which blocks answer which query points, and with what weight.
+
+A small box is put round each point; each block answers with the share of the box that lies in its leaf. The
+answer changes without a jump, therefore, when a point crosses the border between two blocks.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgp.blocks.sites import CELL, CELL_BITS
+from semgp.blocks.tree import overlapped
+from semgp.voxels import AXIS_BITS, HALF_RANGE, slot_of
+
+F32, F64, I32, I64 = NDArray[np.float32], NDArray[np.float64], NDArray[np.int32], NDArray[np.int64]
+
+_MOST = 64  # leaves of one cell, and blocks in all, that may answer one point
+
+
+class Pairs(NamedTuple):
+    """Point, block, weight and place among the point's pairs, all (n,); block -1 where the map knows nothing.
+
+    local (n, 3): the point in metres from the lowest corner of the block's cell.
+    """
+
+    point: I32
+    block: I64
+    rank: I32
+    weight: F32
+    local: F32
+
+
+class CellTrees(NamedTuple):
+    """Cell hash table, and for each cell its first block (-1: none), depth and place of its tree, and the trees."""
+
+    slots: I64
+    keys: I64
+    block: I64
+    depth: I32
+    tree_at: I64
+    axes: NDArray[np.int8]
+    cuts: F32
+
+
+@njit(cache=True, nogil=True)
+def cells_of(points: F64, resolution: float, origin: F64, half: float) -> I64:
+    """Return the keys of the cells that the boxes round points overlap, repeated where neighbours share them."""
+    found = np.empty(64, np.int64)
+    n = 0
+    previous = np.int64(-1)
+    for i in range(len(points)):
+        low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+        inside = True
+        for d in range(3):
+            v = points[i, d] / resolution - origin[d]
+            inside = inside and -HALF_RANGE + CELL < v < HALF_RANGE - CELL
+            low[d], high[d] = _cell(v - half), _cell(v + half)
+        if not inside:
+            continue
+        for x in range(low[0], high[0] + 1):
+            for y in range(low[1], high[1] + 1):
+                for z in range(low[2], high[2] + 1):
+                    key = _key(x, y, z)
+                    if key != previous:
+                        if n == len(found):
+                            longer = np.empty(2 * n, np.int64)
+                            longer[:n] = found
+                            found = longer
+                        found[n] = key
+                        n += 1
+                        previous = key
+    return found[:n]
+
+
+@njit(cache=True, nogil=True)
+def find_pairs(points: F64, first: int, resolution: float, origin: F64, half: float, trees: CellTrees) -> Pairs:
+    """Return the pairs of points, whose numbers count from `first`.
+
+    Parameters
+    ----------
+    points : (M, 3) array
+        Metres, world frame.
+    first : int
+        Number of the first point.
+    resolution : float
+        Edge of a voxel in metres.
+    origin : (3,) array
+        Voxel at the origin of the keys.
+    half : float
+        Half the edge of the box round each point, in voxels.
+    trees : CellTrees
+        The solved cells.
+    """
+    capacity = 2 * len(points) + 2 * _MOST
+    point, block, rank = np.empty(capacity, np.int32), np.empty(capacity, np.int64), np.empty(capacity, np.int32)
+    weight, local = np.empty(capacity, np.float32), np.empty((capacity, 3), np.float32)
+    leaves, shares = np.empty(_MOST, np.int64), np.empty(_MOST, np.float32)
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    box_low, box_high = np.empty(3, np.float32), np.empty(3, np.float32)
+    v, part = np.empty(3), np.empty(3)
+    n = 0
+    for i in range(len(points)):
+        if n + 8 * _MOST > capacity:
+            capacity = 2 * capacity + 8 * _MOST
+            point, block, rank = _longer(point, capacity), _longer(block, capacity), _longer(rank, capacity)
+            weight, grown = _longer(weight, capacity), np.empty((capacity, 3), np.float32)
+            grown[:n] = local[:n]
+            local = grown
+        inside = True
+        for d in range(3):
+            v[d] = points[i, d] / resolution - origin[d]
+            inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
+            low[d], high[d] = _cell(v[d] - half), _cell(v[d] + half)
+        if not inside:
+            point[n], block[n], rank[n], weight[n] = first + i, -1, 0, 1
+            local[n, :] = 0
+            n += 1
+            continue
+        ranked = 0
+        for x in range(low[0], high[0] + 1):
+            part[0] = _share(v[0], half, x, low[0], high[0])
+            for y in range(low[1], high[1] + 1):
+                part[1] = part[0] * _share(v[1], half, y, low[1], high[1])
+                for z in range(low[2], high[2] + 1):
+                    part[2] = part[1] * _share(v[2], half, z, low[2], high[2])
+                    key = _key(x, y, z)
+                    cell = trees.slots[slot_of(key, trees.slots, trees.keys)]
+                    known = cell >= 0 and trees.block[cell] >= 0
+                    for d in range(3):
+                        corner = (x if d == 0 else y if d == 1 else z) * CELL
+                        box_low[d], box_high[d] = (v[d] - half - corner), (v[d] + half - corner)
+                        local[n, d] = (v[d] - corner) * resolution
+                        box_low[d] = max(box_low[d], np.float32(0)) * np.float32(resolution)
+                        box_high[d] = min(box_high[d], np.float32(CELL)) * np.float32(resolution)
+                    found = 1
+                    if known:
+                        found = overlapped(
+                            trees.axes, trees.cuts, trees.tree_at[cell], trees.depth[cell], box_low, box_high,
+                            leaves, shares,
+                        )  # fmt: skip
+                    else:
+                        leaves[0], shares[0] = 0, 1
+                    base = n
+                    for k in range(found):
+                        point[n], rank[n] = first + i, ranked
+                        block[n] = trees.block[cell] + leaves[k] if known else -1
+                        weight[n] = part[2] * shares[k]
+                        for d in range(3):
+                            local[n, d] = local[base, d]
+                        n += 1
+                        ranked += 1
+    return Pairs(point[:n], block[:n], rank[:n], weight[:n], local[:n])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _cell(v: float) -> np.int64:
+    return np.int64(np.floor(v)) >> CELL_BITS
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _key(x: int, y: int, z: int) -> np.int64:
+    shift = HALF_RANGE >> CELL_BITS
+    return (
+        (np.int64(x + shift) << (2 * AXIS_BITS + CELL_BITS))
+        + (np.int64(y + shift) << (AXIS_BITS + CELL_BITS))
+        + (np.int64(z + shift) << CELL_BITS)
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _share(v: float, half: float, x: int, low: int, high: int) -> float:
+    """Share along one axis of the box round v that lies in cell x."""
+    if low == high:
+        return 1.0
+    a, b = max(v - half, float(x * CELL)), min(v + half, float((x + 1) * CELL))
+    return max(b - a, 0.0) / (2 * half)
+
+
+@njit(cache=True, nogil=True)
+def _longer(a: NDArray[np.generic], n: int) -> NDArray[np.generic]:
+    out = np.empty(n, a.dtype)
+    out[: len(a)] = a
+    return out

@@ -1,0 +1,56 @@
+"""Patches to learn from: blocks of some scans, and labels of other scans in the same places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgp.blocks.solve import SHARED, Solved
+
+F32, I32, I64 = NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]
+
+
+class Patch(NamedTuple):
+    """A block, unsolved, and held-out points in its leaf.
+
+    X (D, n), k (n,): members. present (P,). mass (P, n). Y (D, m), label (m,): held-out points and their classes.
+    """
+
+    X: F32
+    k: F32
+    present: NDArray[np.int16]
+    mass: F32
+    Y: F32
+    label: I32
+
+
+def patch(solved: Solved, b: int, Y: F32, label: I32) -> Patch:
+    """Return the patch of block b of a piece and held-out points (m, D) with labels (m,)."""
+    n, P = int(solved.n[b]), int(solved.n_present[b])
+    rows = solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(SHARED + 3 * P, n)
+    return Patch(
+        solved.X[b, :, :n].copy(), solved.k[b, :n].copy(), solved.present[b, :P].copy(),
+        rows[SHARED + 2 * P :].copy(), np.ascontiguousarray(Y.T), label,
+    )  # fmt: skip
+
+
+class Packed(NamedTuple):
+    """Patches in flat arrays: sizes (B, 3) of n, P and m, and their members, classes, masses and points in turn."""
+
+    sizes: I64
+    X: F32
+    k: F32
+    present: NDArray[np.int16]
+    mass: F32
+    Y: F32
+    label: I32
+
+
+def packed(patches: Sequence[Patch]) -> Packed:
+    """Return patches in flat arrays."""
+    sizes = np.array([(len(p.k), len(p.present), len(p.label)) for p in patches], dtype=np.int64)
+    X, k, present, mass, Y, label = (np.concatenate([a.ravel() for a in column]) for column in zip(*patches))
+    return Packed(sizes, X, k, present, mass, Y, label)

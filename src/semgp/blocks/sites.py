@@ -1,0 +1,260 @@
+"""Sites: what the map keeps of all labels, the class mass and mean position of each voxel that has some.
+
+All sums are integers. A sum of integers does not depend on its order, so neither does the map: scans in any order
+and any number of threads give the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgp.errors import InputError
+from semgp.voxels import HALF_RANGE, VoxelTable, voxel_keys, voxel_origin
+
+MASS_UNIT = 1 << 12
+"""Steps of a class mass of one label."""
+
+PLACE_UNIT = 1 << 24
+"""Steps of a position within its voxel: 12 nanometres at 0.2 m."""
+
+FEATURE_UNIT = 1 << 16
+"""Steps of a feature of 1."""
+
+CELL_BITS = 6
+CELL = 1 << CELL_BITS
+"""Voxels along the edge of a cell."""
+
+
+class Sites:
+    """Class mass, position and features of each voxel with labels, and the cells that the voxels lie in.
+
+    A site is the mean of its voxel's labelled points. Cells are cubes of `CELL` voxels, aligned to the world's
+    origin: the unit that is solved again when its data change.
+
+    Parameters
+    ----------
+    n_classes : int
+        C.
+    n_features : int
+        Inputs beyond the three coordinates.
+    resolution : float
+        Edge of a voxel in metres.
+    """
+
+    def __init__(self, n_classes: int, n_features: int, resolution: float) -> None:
+        self.resolution = resolution
+        self.origin: NDArray[np.int64] | None = None
+        self.voxels, self.cells = VoxelTable(), VoxelTable()
+        self._mass = np.zeros((0, n_classes), dtype=np.uint32)
+        self._place = np.zeros((0, 3 + n_features), dtype=np.int64)
+        self._next = np.empty(0, dtype=np.int32)
+        self._cell = np.empty(0, dtype=np.int32)
+        self._head = np.empty(0, dtype=np.int32)
+        self._size = np.empty(0, dtype=np.int32)
+
+    def __len__(self) -> int:
+        return len(self.voxels)
+
+    @property
+    def mass(self) -> NDArray[np.uint32]:
+        """Class mass (S, C) in steps of 1 / `MASS_UNIT`."""
+        return self._mass[: len(self)]
+
+    @property
+    def place(self) -> NDArray[np.int64]:
+        """Mass times position within the voxel and features, summed (S, 3 + F)."""
+        return self._place[: len(self)]
+
+    @property
+    def head(self) -> NDArray[np.int32]:
+        """First site of each cell, -1 for none."""
+        return self._head[: len(self.cells)]
+
+    @property
+    def size(self) -> NDArray[np.int32]:
+        """Number of sites of each cell."""
+        return self._size[: len(self.cells)]
+
+    @property
+    def next(self) -> NDArray[np.int32]:
+        """The site that follows each site in its cell, -1 for none."""
+        return self._next[: len(self)]
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Positions (S, 3) in metres, world frame."""
+        if self.origin is None:
+            return np.empty((0, 3))
+        mask = (1 << 21) - 1
+        keys = self.voxels.keys
+        index = np.stack([keys >> 42, keys >> 21 & mask, keys & mask], axis=1) - HALF_RANGE + self.origin
+        total = self.mass.sum(axis=1, dtype=np.int64)[:, None]
+        return np.asarray((index + self.place[:, :3] / (total * float(PLACE_UNIT))) * self.resolution)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all arrays."""
+        owned = (self._mass, self._place, self._next, self._cell, self._head, self._size)
+        return sum(a.nbytes for a in owned) + self.voxels.n_bytes + self.cells.n_bytes
+
+    def add(
+        self,
+        points: NDArray[np.float64],
+        labels: NDArray[np.int32] | None,
+        weights: NDArray[np.float32] | None,
+        features: NDArray[np.float32],
+    ) -> NDArray[np.int32]:
+        """Add labelled points, hard or soft, and return the cells that they lie in.
+
+        Raises
+        ------
+        InputError
+            Points a million voxels from the first, or weights beyond what a sum can hold.
+        """
+        if not len(points):
+            return np.empty(0, dtype=np.int32)
+        if self.origin is None:
+            self.origin = voxel_origin(points, self.resolution) >> CELL_BITS << CELL_BITS
+        if weights is not None and weights.max() > 1024:
+            raise InputError("weights of soft labels must not be beyond 1024: divide them, or use probabilities.")
+        known = len(self)
+        rows = self.voxels.insert(voxel_keys(points, self.resolution, self.origin))
+        self._grow()
+        self._link(known)
+        fraction = points / self.resolution
+        fraction -= np.floor(fraction)
+        if labels is not None:
+            _add_hard(rows, labels, fraction, features, self._mass, self._place)
+        elif weights is not None:
+            _add_soft(rows, weights, fraction, features, self._mass, self._place)
+        touched = np.zeros(len(self.cells), dtype=bool)
+        touched[self._cell[rows]] = True
+        return np.flatnonzero(touched).astype(np.int32)
+
+    def cell_ids(self, keys: NDArray[np.int64]) -> NDArray[np.int32]:
+        """Return the cells of cell keys; those not met before are new, and empty."""
+        ids = self.cells.insert(keys).astype(np.int32)
+        self._head = _extended(self._head, len(self.cells), -1)
+        self._size = _extended(self._size, len(self.cells), 0)
+        return ids
+
+    def _grow(self) -> None:
+        n = len(self.voxels)
+        self._mass, self._place = _extended(self._mass, n, 0), _extended(self._place, n, 0)
+        self._next, self._cell = _extended(self._next, n, -1), _extended(self._cell, n, -1)
+
+    def _link(self, known: int) -> None:
+        """Append the sites from `known` on to the chains of their cells."""
+        new = self.voxels.keys[known:]
+        cells = self.cell_ids(cell_keys(new))
+        self._cell[known : known + len(new)] = cells
+        _chain(cells, known, self._head, self._size, self._next)
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays from which `restore` makes the same sites."""
+        origin = np.zeros(3, dtype=np.int64) if self.origin is None else self.origin
+        return {
+            "voxels": self.voxels.keys,
+            "mass": self.mass,
+            "place": self.place,
+            "origin": origin,
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Fill empty sites with what `to_arrays` gave.
+
+        Raises
+        ------
+        InputError
+            Keys that occur twice or sites without mass.
+        """
+        keys = arrays["voxels"]
+        if not len(keys):
+            return
+        if (keys < 0).any() or not (arrays["mass"] > 0).any(axis=1).all():
+            raise InputError("the stored sites are damaged: a voxel out of range, or one without mass.")
+        self.origin = arrays["origin"]
+        self.voxels.insert(keys)
+        if len(self) != len(keys):
+            raise InputError("the stored sites are damaged: a voxel occurs twice.")
+        self._grow()
+        self._mass[: len(self)], self._place[: len(self)] = arrays["mass"], arrays["place"]
+        self._link(0)
+
+
+def cell_keys(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the keys of the cells that voxels lie in: those of their lowest voxels."""
+    low = (1 << CELL_BITS) - 1
+    return keys & ~np.int64(low << 42 | low << 21 | low)
+
+
+def _extended(a: NDArray[Any], n: int, fill: int) -> NDArray[Any]:
+    """The array with room for n rows at least, doubled where it was too short."""
+    if n <= len(a):
+        return a
+    longer = np.empty((max(n, 2 * len(a)), *a.shape[1:]), dtype=a.dtype)
+    longer[: len(a)] = a
+    longer[len(a) :] = fill
+    return longer
+
+
+@njit(cache=True, nogil=True)
+def _chain(
+    cells: NDArray[np.int32],
+    known: int,
+    head: NDArray[np.int32],
+    size: NDArray[np.int32],
+    following: NDArray[np.int32],
+) -> None:
+    for i in range(len(cells)):
+        c = cells[i]
+        following[known + i] = head[c]
+        head[c] = known + i
+        size[c] += 1
+
+
+@njit(cache=True, nogil=True)
+def _add_hard(
+    rows: NDArray[np.int64],
+    labels: NDArray[np.int32],
+    fraction: NDArray[np.float64],
+    features: NDArray[np.float32],
+    mass: NDArray[np.uint32],
+    place: NDArray[np.int64],
+) -> None:
+    for i in range(len(rows)):
+        mass[rows[i], labels[i]] += np.uint32(MASS_UNIT)
+        _add_place(rows[i], MASS_UNIT, fraction[i], features[i], place)
+
+
+@njit(cache=True, nogil=True)
+def _add_soft(
+    rows: NDArray[np.int64],
+    weights: NDArray[np.float32],
+    fraction: NDArray[np.float64],
+    features: NDArray[np.float32],
+    mass: NDArray[np.uint32],
+    place: NDArray[np.int64],
+) -> None:
+    for i in range(len(rows)):
+        total = 0
+        for c in range(weights.shape[1]):
+            w = int(np.rint(weights[i, c] * MASS_UNIT))
+            mass[rows[i], c] += np.uint32(w)
+            total += w
+        _add_place(rows[i], total, fraction[i], features[i], place)
+
+
+@njit(cache=True, nogil=True)
+def _add_place(
+    row: int, w: int, fraction: NDArray[np.float64], features: NDArray[np.float32], place: NDArray[np.int64]
+) -> None:
+    for d in range(3):
+        place[row, d] += w * int(np.rint(fraction[d] * PLACE_UNIT))
+    for f in range(len(features)):
+        place[row, 3 + f] += w * int(np.rint(features[f] * FEATURE_UNIT))

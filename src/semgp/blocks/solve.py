@@ -1,0 +1,229 @@
+"""The closed-form posteriors of blocks: one covariance and one factor for all classes and both kinds of targets.
+
+With class mass n_jc, n_j = sum_c n_jc and the prior class probabilities pi_c, the targets of member j are
+
+* indicators: n_jc / n_j - pi_c, and
+* log-ratios: log((n_jc + a pi_c) / (n_j + a)) - log pi_c.
+
+A = K + diag(s_n / n_j + nugget / k_j) is the same for all of them. A class without mass in the block has targets
+that are the same for each such class, up to the factor pi_c: two more columns serve all of them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from semgp.blocks.covariance import Mixture, covariance_tile
+from semgp.blocks.layout import Layout
+from semgp.blocks.linear import inverse_factor
+from semgp.blocks.members import Members, Sizes, gather
+from semgp.blocks.tree import split, tree_depth
+
+F32, I32, I64 = NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]
+
+SHARED = 3
+"""Rows of coefficients that do not belong to one class: absent indicator, absent log-ratio, vote of all mass."""
+
+
+class Noise(NamedTuple):
+    """What the targets and their noise depend on: s_n, nugget, a, the prior pi (C,), and whether to solve at all."""
+
+    s_n: float
+    nugget: float
+    a: float
+    prior: F32
+    solve: bool
+
+
+class Solved(NamedTuple):
+    """Posteriors of some cells' blocks, one after the other.
+
+    n (B,): members. X (B, D, total), k (B, total): their positions and the sites they join. n_present (B,), present (B, C): the classes with mass in
+    the block. at (B + 1,), coefficients: where in the flat array each block's (3 + 3 P, n) coefficients begin.
+    at_factor (B + 1,), factor: the same for the inverse Cholesky factors (n, n).
+    """
+
+    n: I32
+    X: F32
+    k: F32
+    n_present: I32
+    present: NDArray[np.int16]
+    at: I64
+    coefficients: F32
+    at_factor: I64
+    factor: F32
+
+
+@njit(cache=True, nogil=True)
+def solve_cells(
+    layout: Layout,
+    places: I64,
+    around: I32,
+    edge: float,
+    sizes: Sizes,
+    kernel: Mixture,
+    noise: Noise,
+    tree_at: I64,
+    axes: NDArray[np.int8],
+    cuts: F32,
+    block_at: I64,
+) -> Solved:
+    """Split cells into blocks and solve each.
+
+    Parameters
+    ----------
+    layout : Layout
+        The cells and those round about.
+    places : (n,) array
+        Places of the cells in the layout.
+    around : (L, 27) array
+        Places of the cells round about each cell of the layout, -1 for none.
+    edge : float
+        Edge of a cell in metres.
+    sizes, kernel, noise
+        The model.
+    tree_at : (n,) array
+        Where each cell's tree begins in `axes` and `cuts`, which are filled in.
+    axes, cuts : arrays
+        The trees' planes.
+    block_at : (n + 1,) array
+        Where each cell's blocks begin.
+    """
+    T, D, C = sizes.total, layout.X.shape[1], layout.mass.shape[1]
+    first, B = block_at[0], block_at[len(places)] - block_at[0]
+    solved = Solved(
+        np.zeros(B, np.int32),
+        np.empty((B, D, T), np.float32),
+        np.empty((B, T), np.float32),
+        np.zeros(B, np.int32),
+        np.empty((B, C), np.int16),
+        np.zeros(B + 1, np.int64),
+        np.empty(B * T * (SHARED + 3 * min(C, 6)), np.float32),
+        np.zeros(B + 1, np.int64),
+        np.empty(B * T * T if noise.solve else 0, np.float32),
+    )
+    coefficients = solved.coefficients
+    marks = np.full(len(layout.row), -1, np.int32)
+    members = Members(
+        np.empty((D, T), np.float32), np.empty((T, C), np.float32), np.empty(T, np.float32)
+    )
+    K, work = np.empty(T * T, np.float32), np.empty(T, np.float32)
+    for i in range(len(places)):
+        cell = places[i]
+        a, n_sites = layout.start[cell], layout.start[cell + 1] - layout.start[cell]
+        depth = tree_depth(n_sites, sizes.leaf)
+        order, bounds = np.empty(n_sites, np.int64), np.empty((1 << depth) + 1, np.int64)
+        t, size = tree_at[i], (1 << depth) - 1
+        split(layout.X[a : a + n_sites], order, depth, axes[t : t + size], cuts[t : t + size], bounds)
+        for leaf in range(1 << depth):
+            b = block_at[i] - first + leaf
+            own = order[bounds[leaf] : bounds[leaf + 1]] + a
+            n = gather(layout, around[cell], own, edge, sizes, marks, np.int32(b), members)
+            P = _present(members.mass, n, solved.present[b])
+            W = SHARED + 3 * P
+            if solved.at[b] + W * n > len(coefficients):
+                longer = np.empty(max(2 * len(coefficients), solved.at[b] + W * n), np.float32)
+                longer[: solved.at[b]] = coefficients[: solved.at[b]]
+                coefficients = longer
+            solved.n[b], solved.n_present[b] = n, P
+            solved.X[b, :, :n], solved.k[b, :n] = members.X[:, :n], members.k[:n]
+            solved.at[b + 1] = solved.at[b] + W * n
+            solved.at_factor[b + 1] = solved.at_factor[b] + (n * n if noise.solve else 0)
+            rows = coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n)
+            for j in range(n):
+                rows[2 + 2 * P, j] = 0
+                for p in range(P):
+                    rows[3 + 2 * P + p, j] = members.mass[j, solved.present[b, p]]
+                    rows[2 + 2 * P, j] += rows[3 + 2 * P + p, j]
+            if noise.solve and n:
+                factor = solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]].reshape(n, n)
+                solve_block(members.X, members.k, n, solved.present[b, :P], kernel, noise, rows, factor, K, work)
+    return Solved(
+        solved.n,
+        solved.X,
+        solved.k,
+        solved.n_present,
+        solved.present,
+        solved.at,
+        coefficients[: solved.at[B]],
+        solved.at_factor,
+        solved.factor[: solved.at_factor[B]],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _present(mass: F32, n: int, present: NDArray[np.int16]) -> int:
+    """Fill in the classes that have mass, in ascending order, and return their number."""
+    P = 0
+    for c in range(mass.shape[1]):
+        for j in range(n):
+            if mass[j, c] > 0:
+                present[P] = c
+                P += 1
+                break
+    return P
+
+
+@njit(cache=True, nogil=True)
+def solve_block(
+    X: F32,
+    k: F32,
+    n: int,
+    present: NDArray[np.int16],
+    kernel: Mixture,
+    noise: Noise,
+    rows: F32,
+    factor: F32,
+    K_flat: F32,
+    work: F32,
+) -> None:
+    """Fill in the coefficients of a block, and its inverse factor, from the class masses in its last rows.
+
+    Parameters
+    ----------
+    X, k : (D, .), (.,) arrays
+        Positions, and the number of sites joined, of the first n members.
+    n : int
+        Members.
+    present : (P,) array
+        The classes with mass.
+    kernel, noise
+        The model.
+    rows : (3 + 3 P, n) array
+        The last P + 1 rows hold all mass and the class masses; the others are filled in.
+    factor : (n, n) array
+        Filled in.
+    K_flat, work : arrays
+        Scratch for n * n and n numbers.
+    """
+    P = len(present)
+    _targets(rows, n, present, noise)
+    A = K_flat[: n * n].reshape(n, n)
+    covariance_tile(X, n, X, n, kernel, A, work)
+    for j in range(n):
+        A[j, j] += np.float32(noise.s_n) / rows[2 + 2 * P, j] + np.float32(noise.nugget) / k[j]
+    inverse_factor(A, factor)
+    targets = rows[: 2 + 2 * P]
+    targets[:, :] = np.dot(np.dot(targets, factor.T), factor)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _targets(rows: F32, n: int, present: NDArray[np.int16], noise: Noise) -> None:
+    """Fill in the targets, one row each: 1, absent log-ratio, indicators, log-ratios.
+
+    The first row is solved to A^-1 1: an absent class has the indicator -pi_c everywhere.
+    """
+    P = len(present)
+    a = np.float32(noise.a)
+    for j in range(n):
+        total = rows[2 + 2 * P, j]
+        log_total = np.log(total + a)
+        rows[0, j], rows[1, j] = 1, np.log(a) - log_total
+        for p in range(P):
+            m, pi = rows[3 + 2 * P + p, j], noise.prior[present[p]]
+            rows[2 + p, j] = m / total - pi
+            rows[2 + P + p, j] = np.log(m + a * pi) - log_total - np.log(pi)
