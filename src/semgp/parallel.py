@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from functools import cache
+from importlib import import_module
 from typing import TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -18,9 +21,17 @@ def n_workers() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def one_blas_thread() -> threadpool_limits:
+def one_blas_thread() -> AbstractContextManager[object]:
     """Return a context in which BLAS uses one thread: small matrices are slower with more."""
-    return threadpool_limits(limits=1, user_api="blas")
+    limits: AbstractContextManager[object] = _blas_libraries().limit(limits=1, user_api="blas")
+    return limits
+
+
+@cache
+def _blas_libraries() -> ThreadpoolController:
+    """The BLAS libraries of this process, both numpy's and scipy's: looking for them takes a millisecond."""
+    import_module("scipy.linalg")
+    return ThreadpoolController()
 
 
 def parallel_map(work: Callable[[T], R], items: Iterable[T], workers: int | None = None) -> list[R]:

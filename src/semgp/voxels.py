@@ -138,7 +138,7 @@ class VoxelTable:
 
 
 @njit(cache=True, nogil=True)
-def slot_of(key: int, slots: NDArray[np.int64], keys: NDArray[np.int64]) -> np.int64:
+def slot_of(key: int | np.int64, slots: NDArray[np.int64], keys: NDArray[np.int64]) -> np.int64:
     """Return the slot that holds the row of `key`, or the empty one (-1) where it belongs."""
     mask = len(slots) - 1
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)  # Fibonacci hashing: the high bits are well mixed

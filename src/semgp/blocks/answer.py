@@ -6,14 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, I16, I64
 from semgp.blocks.covariance import Mixture, covariance_tile
 from semgp.blocks.link import Link, class_probabilities
 from semgp.blocks.pairs import Pairs
 from semgp.blocks.solve import SHARED, Solved
-
-F32, I64 = NDArray[np.float32], NDArray[np.int64]
 
 TILE = 64
 """Points that are answered together: their covariances with a block stay in the cache."""
@@ -61,7 +59,7 @@ def answer_pairs(
     """
     D, T = solved.X.shape[1], solved.X.shape[2]
     most = SHARED + 3 * solved.present.shape[1]
-    X, work = np.empty((D, TILE), np.float32), np.empty(TILE, np.float32)
+    X, work, variance = np.empty((D, TILE), np.float32), np.empty(T, np.float32), np.empty(TILE, np.float32)
     K_flat, V_flat = np.empty(T * TILE, np.float32), np.empty(T * TILE, np.float32)
     F_flat, p_flat = np.empty(most * TILE, np.float32), np.empty(most * TILE, np.float32)
     prior_variance = np.float32(0)
@@ -83,21 +81,19 @@ def answer_pairs(
                 X[d, q] = pairs.local[pair, d]
             if D > 3:
                 _fill_features(X, q, features[pairs.point[pair]], Z, n)
-        K = K_flat[: n * m].reshape(n, m)
-        covariance_tile(Z, n, X, m, kernel, K, work)
+        K = K_flat[: m * n].reshape(m, n)  # a row has all members, whole vectors, however few the points
+        covariance_tile(X, m, Z, n, kernel, K, work)
         F = F_flat[: W * m].reshape(W, m)
-        np.dot(solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n), K, F)
-        for q in range(m):
-            work[q] = prior_variance
+        np.dot(solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n), K.T, F)
         if solved.at_factor[b + 1] > solved.at_factor[b]:
-            V = V_flat[: n * m].reshape(n, m)
-            np.dot(solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]].reshape(n, n), K, V)
-            _subtract_squares(V, work, m)
+            V = V_flat[: m * n].reshape(m, n)
+            np.dot(K, solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]].reshape(n, n).T, V)
+            _unexplained(V, prior_variance, variance)
         else:
-            _explained_by_vote(F[2 + 2 * P], prior_variance, link.v_0, work, m)
+            _explained_by_vote(F[2 + 2 * P], prior_variance, link.v_0, variance, m)
         p = p_flat[: (P + 1) * m].reshape(P + 1, m)
         class_probabilities(F, solved.present[b, :P], m, link, p)
-        _add(pairs, order, begin, m, solved.present[b, :P], p, F, work, link, answers)
+        _add(pairs, order, begin, m, solved.present[b, :P], p, F, variance, link, answers)
         begin = end
 
 
@@ -125,13 +121,13 @@ def _fill_features(X: F32, q: int, given: F32, Z: F32, n: int) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _subtract_squares(V: F32, variance: F32, m: int) -> None:
-    for j in range(V.shape[0]):
-        row = V[j]
-        for q in range(m):
-            variance[q] -= row[q] * row[q]
-    for q in range(m):
-        variance[q] = max(variance[q], np.float32(0))
+def _unexplained(V: F32, prior_variance: np.float32, variance: F32) -> None:
+    """Fill in the prior's variance less what the members explain."""
+    for q in range(V.shape[0]):
+        row, explained = V[q], np.float32(0)
+        for j in range(V.shape[1]):
+            explained += row[j] * row[j]
+        variance[q] = max(prior_variance - explained, np.float32(0))
 
 
 @njit(cache=True, nogil=True)
@@ -147,7 +143,7 @@ def _add(
     order: I64,
     begin: int,
     m: int,
-    present: NDArray[np.int16],
+    present: I16,
     p: F32,
     F: F32,
     variance: F32,

@@ -1,4 +1,4 @@
-"""Covariances of sums of stationary kernels in single precision, a tile at a time: the inner loop of the block map."""
+"""Covariances of sums of stationary kernels in single precision, tile by tile: the block map's inner loop."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, F64, I64
+from semgp.blocks.elementary import exp_minus
 from semgp.errors import InputError
 from semgp.gp.kernels import Kernel, Sum
 from semgp.gp.stationary import Matern12, Matern32, Matern52, SquaredExponential, Stationary
-
-F32 = NDArray[np.float32]
 
 _SCALE = {Matern12: 1.0, Matern32: 3.0, Matern52: 5.0, SquaredExponential: 0.5}
 _KINDS = tuple(_SCALE)
@@ -26,7 +25,7 @@ class Mixture(NamedTuple):
     are multiplied by. variance (Q,): sf^2.
     """
 
-    kind: NDArray[np.int64]
+    kind: I64
     weight: F32
     variance: F32
 
@@ -45,8 +44,8 @@ def mixture(kernel: Kernel, n_dims: int) -> Mixture:
         dims = list(range(n_dims)) if term.dims is None else list(term.dims)
         if max(dims) >= n_dims or len(term.ell) not in (1, len(dims)):
             raise InputError(f"the kernel's length scales {term.ell} do not fit inputs of {n_dims} dimensions.")
-        weight[q, dims] = _SCALE[type(term)] / np.asarray(term.ell) ** 2  # type: ignore[index]
-    kind = np.array([_KINDS.index(type(term)) for term in terms])  # type: ignore[arg-type]
+        weight[q, dims] = _SCALE[type(term)] / np.asarray(term.ell) ** 2
+    kind = np.array([_KINDS.index(type(term)) for term in terms])
     variance = np.array([term.sf**2 for term in terms])
     return Mixture(kind, weight.astype(np.float32), variance.astype(np.float32))
 
@@ -78,57 +77,43 @@ def covariance_tile(Z: F32, n: int, X: F32, m: int, kernel: Mixture, K: F32, wor
         for q in range(m):
             row[q] = 0
         for k in range(len(kind)):
-            for q in range(m):
-                work[q] = 0
-            for d in range(weight.shape[1]):
-                w, z, x = weight[k, d], Z[d, j], X[d]
-                for q in range(m):
-                    difference = x[q] - z
-                    work[q] += w * difference * difference
+            _scaled_squares(Z, j, X, m, weight[k], work)
             s = variance[k]
             if kind[k] == 0:
                 for q in range(m):
-                    row[q] += s * _exp_minus(np.sqrt(work[q]))
+                    row[q] += s * exp_minus(np.sqrt(work[q]))
             elif kind[k] == 1:
                 for q in range(m):
                     t = np.sqrt(work[q])
-                    row[q] += s * (_ONE + t) * _exp_minus(t)
+                    row[q] += s * (_ONE + t) * exp_minus(t)
             elif kind[k] == 2:
                 for q in range(m):
                     t = np.sqrt(work[q])
-                    row[q] += s * (_ONE + t + t * t * _THIRD) * _exp_minus(t)
+                    row[q] += s * (_ONE + t + t * t * _THIRD) * exp_minus(t)
             else:
                 for q in range(m):
-                    row[q] += s * _exp_minus(work[q])
-
-
-# 2^f for 0 <= f < 1, coefficients of the Taylor series in f log 2, the last two fitted
-_C = tuple(
-    np.float32(c)
-    for c in (1.0, 0.6931471805599453, 0.2402265069591007, 5.550410866482158e-2, 9.618129107628477e-3)
-)
-_C5, _C6 = np.float32(1.3333558146428443e-3), np.float32(1.5403530393381608e-4)
-_LOG2E, _LOWEST = np.float32(-1.4426950408889634), np.float32(-126)
+                    row[q] += s * exp_minus(work[q])
 
 
 @njit(cache=True, nogil=True, fastmath=True, inline="always")
-def _exp_minus(t: np.float32) -> np.float32:
-    """exp(-t) for t >= 0: a power of two from the exponent's bits times a polynomial."""
-    y = max(t * _LOG2E, _LOWEST)
-    n = np.floor(y)
-    f = y - n
-    p = _C5 + f * _C6
-    p = _C[4] + f * p
-    p = _C[3] + f * p
-    p = _C[2] + f * p
-    p = _C[1] + f * p
-    p = _C[0] + f * p
-    return p * np.int32((np.int32(n) + np.int32(127)) << np.int32(23)).view(np.float32)
+def _scaled_squares(Z: F32, j: int, X: F32, m: int, w: F32, out: F32) -> None:
+    """Fill in sum_d w_d (x_qd - z_jd)^2; the three coordinates in one pass, features after them."""
+    z0, z1, z2 = Z[0, j], Z[1, j], Z[2, j]
+    w0, w1, w2 = w[0], w[1], w[2]
+    x0, x1, x2 = X[0], X[1], X[2]
+    for q in range(m):
+        d0, d1, d2 = x0[q] - z0, x1[q] - z1, x2[q] - z2
+        out[q] = w0 * d0 * d0 + w1 * d1 * d1 + w2 * d2 * d2
+    for d in range(3, len(w)):
+        z, x, wd = Z[d, j], X[d], w[d]
+        for q in range(m):
+            difference = x[q] - z
+            out[q] += wd * difference * difference
 
 
 @njit(cache=True, nogil=True, fastmath=True)
 def derivative_tile(
-    Z: F32, n: int, X: F32, m: int, kernel: Mixture, H: F32, sign: float, out: NDArray[np.float64], work: F32
+    Z: F32, n: int, X: F32, m: int, kernel: Mixture, H: F32, sign: float, out: F64, work: F32
 ) -> None:
     """Add sign * sum_jq H_jq dk(z_j, x_q) / dlog ell_d and / dlog sf to `out` (Q, D + 1), for each term."""
     kind, weight, variance = kernel
@@ -136,36 +121,30 @@ def derivative_tile(
     for j in range(n):
         h = H[j]
         for k in range(len(kind)):
-            for q in range(m):
-                work[q] = 0
-            for d in range(D):
-                w, z, x = weight[k, d], Z[d, j], X[d]
-                for q in range(m):
-                    difference = x[q] - z
-                    work[q] += w * difference * difference
+            _scaled_squares(Z, j, X, m, weight[k], work)
             # value, and what multiplies w_d (x_d - z_d)^2 in the derivative, both without sf^2
             value = np.float32(0)
             if kind[k] == 0:
                 for q in range(m):
                     t = np.sqrt(work[q])
-                    e = h[q] * _exp_minus(t)
+                    e = h[q] * exp_minus(t)
                     value += e
                     work[q] = e / max(t, np.float32(1e-6))
             elif kind[k] == 1:
                 for q in range(m):
                     t = np.sqrt(work[q])
-                    e = h[q] * _exp_minus(t)
+                    e = h[q] * exp_minus(t)
                     value += e * (_ONE + t)
                     work[q] = e
             elif kind[k] == 2:
                 for q in range(m):
                     t = np.sqrt(work[q])
-                    e = h[q] * _exp_minus(t)
+                    e = h[q] * exp_minus(t)
                     value += e * (_ONE + t + t * t * _THIRD)
                     work[q] = e * (_ONE + t) * _THIRD
             else:
                 for q in range(m):
-                    e = h[q] * _exp_minus(work[q])
+                    e = h[q] * exp_minus(work[q])
                     value += e
                     work[q] = np.float32(2) * e
             s = sign * variance[k]

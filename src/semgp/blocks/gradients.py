@@ -1,7 +1,7 @@
 """Held-out log-loss of patches and its gradient in all parameters of the model, by the chain rule backwards.
 
-With F = Y A^-1 K_*, G = dL/dF, B = A^-1 K_* and H = (Y A^-1)^T G, the gradients are dL/dK_* = H, dL/dA = -H B^T and
-dL/dY = G B^T.
+With F = Y A^-1 K_*, G = dL/dF, B = A^-1 K_* and H = (Y A^-1)^T G, the gradients are dL/dK_* = H, dL/dA = -H B^T
+and dL/dY = G B^T.
 """
 
 from __future__ import annotations
@@ -10,19 +10,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, F64, I16, I32
 from semgp.blocks.covariance import Mixture, covariance_tile, derivative_tile
 from semgp.blocks.link import Link, class_probabilities
 from semgp.blocks.patches import Packed
 from semgp.blocks.solve import SHARED, Noise, solve_block
 
-F32, F64 = NDArray[np.float32], NDArray[np.float64]
-
 
 class Gradient(NamedTuple):
-    """Sums over patches: loss (1,), and derivatives in log length scales and log sf (Q, D + 1), s_n, nugget and a
-    (3,), and delta, v_0 and the three weights (5,); all but the kernel's are plain derivatives, not logarithmic."""
+    """Sums over patches of the loss and its derivatives.
+
+    loss (1,). kernel (Q, D + 1): in the logarithms of length scales and sf. noise (3,): in s_n, nugget and a. link
+    (5,): in delta, v_0 and the three weights.
+    """
 
     loss: F64
     kernel: F64
@@ -76,9 +77,7 @@ def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, li
 
 
 @njit(cache=True, nogil=True)
-def _link_gradient(
-    F: F32, prob: F32, present: NDArray[np.int16], label: NDArray[np.int32], link: Link, G: F32, g: F64
-) -> float:
+def _link_gradient(F: F32, prob: F32, present: I16, label: I32, link: Link, G: F32, g: F64) -> float:
     """Return the mean log-loss; fill in G = dL/dF and add the derivatives in the link's parameters to g."""
     P, m = len(present), len(label)
     prior, power, delta, v_0, w_i, w_l, w_v = link
@@ -118,9 +117,7 @@ def _link_gradient(
 
 
 @njit(cache=True, nogil=True)
-def _noise_gradient(
-    S: F32, G_rows: F32, rows: F32, k: F32, present: NDArray[np.int16], noise: Noise, g: F64
-) -> None:
+def _noise_gradient(S: F32, G_rows: F32, rows: F32, k: F32, present: I16, noise: Noise, g: F64) -> None:
     """Add the derivatives in s_n, nugget and a; S is minus dL/dA, G_rows is dL/dY."""
     P, a = len(present), noise.a
     for j in range(len(k)):

@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, I32, I64, U32
 from semgp.blocks.sites import CELL_BITS, FEATURE_UNIT, MASS_UNIT, PLACE_UNIT, Sites
-from semgp.parallel import parallel_map, slices, n_workers
+from semgp.parallel import n_workers, parallel_map, slices
 from semgp.voxels import STEP
 
 COARSE_BITS = 2
-F32, I32, I64 = NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]
 
 _OFFSETS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)])
 
@@ -39,7 +38,7 @@ class Layout(NamedTuple):
     first: I32
     n_coarse: I32
     centre: F32
-    mass: NDArray[np.uint32]
+    mass: U32
     unit: float
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-F32 = NDArray[np.float32]
+from semgp.blocks.arrays import F32
 
 _SPLIT = 48  # above this many rows, halves and matrix products are faster than plain loops
 

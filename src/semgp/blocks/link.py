@@ -16,11 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, I16
+from semgp.blocks.elementary import exp_minus, log
 from semgp.blocks.solve import SHARED
-
-F32 = NDArray[np.float32]
 
 
 class Link(NamedTuple):
@@ -36,39 +35,37 @@ class Link(NamedTuple):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def class_probabilities(F: F32, present: NDArray[np.int16], m: int, link: Link, p: F32) -> None:
+def class_probabilities(F: F32, present: I16, m: int, link: Link, p: F32) -> None:
     """Fill in p (P + 1, m): probabilities of the present classes, and what an absent one's pi_c power multiplies.
 
     F (3 + 3 P, m) are the latent values: coefficients times covariances.
     """
     P = len(present)
     prior, _, delta, v_0, w_i, w_l, w_v = link
-    floor, top = np.float32(1e-30), np.float32(-1e30)
-    peak = np.full(m, top, np.float32)
+    peak = np.full(m, np.float32(-1e30), np.float32)
     for c in range(P + 1):
         row = p[c]
         pi = prior[present[c]] if c < P else np.float32(1)
         for q in range(m):
             row[q] = 0
         if w_i > 0:
+            indicator = F[2 + c] if c < P else F[0]
+            sign, offset = (np.float32(1), pi) if c < P else (np.float32(-1), np.float32(1))
             for q in range(m):
-                latent = F[2 + c, q] + pi if c < P else np.float32(1) - F[0, q]
-                row[q] += w_i * np.log(max(max(latent, np.float32(0)) + delta * pi, floor))
+                latent = offset + sign * indicator[q]
+                row[q] += w_i * log(max(latent, np.float32(0)) + delta * pi)
         if w_l > 0:
             z = F[2 + P + c] if c < P else F[1]
             log_pi = np.log(pi)
             for q in range(m):
                 row[q] += w_l * (z[q] + log_pi)
         if w_v > 0:
+            votes = F[SHARED + 2 * P + c] if c < P else F[0]
+            counted = np.float32(1) if c < P else np.float32(0)
             for q in range(m):
-                v = F[SHARED + 2 * P + c, q] if c < P else np.float32(0)
-                row[q] += w_v * np.log(max(v + v_0 * pi, floor))
-        if c < P:
-            for q in range(m):
-                peak[q] = max(peak[q], row[q])
-        else:
-            for q in range(m):
-                peak[q] = max(peak[q], row[q])
+                row[q] += w_v * log(counted * votes[q] + v_0 * pi)
+        for q in range(m):
+            peak[q] = max(peak[q], row[q])
     rest = np.float32(0)
     is_present = np.zeros(len(prior), np.bool_)
     for c in present:
@@ -80,7 +77,7 @@ def class_probabilities(F: F32, present: NDArray[np.int16], m: int, link: Link, 
     for c in range(P + 1):
         share = np.float32(1) if c < P else rest
         for q in range(m):
-            p[c, q] = np.exp(p[c, q] - peak[q])
+            p[c, q] = exp_minus(peak[q] - p[c, q])
             total[q] += share * p[c, q]
     for c in range(P + 1):
         for q in range(m):

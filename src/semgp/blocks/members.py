@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, I32, I64
 from semgp.blocks.layout import Layout
 from semgp.blocks.tree import _select
-
-F32, I32, I64 = NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]
 
 
 class Sizes(NamedTuple):
@@ -23,7 +21,7 @@ class Sizes(NamedTuple):
 
 
 class Members(NamedTuple):
-    """The members of one block: position and features X (D, total), class mass (total, C), sites joined k (total,)."""
+    """The members of one block: positions and features X (D, total), mass (total, C), sites joined k (total,)."""
 
     X: F32
     mass: F32
@@ -103,9 +101,7 @@ def gather(
 
 
 @njit(cache=True, nogil=True)
-def _nearest(
-    layout: Layout, around: I32, low: F32, high: F32, edge: float, wanted: int
-) -> tuple[I32, I32, I64]:
+def _nearest(layout: Layout, around: I32, low: F32, high: F32, edge: float, wanted: int) -> tuple[I32, I32, I64]:
     """Coarse voxels near a box: index in their cell, place of the cell, and the order of the nearest ones."""
     capacity = 0
     for at in range(27):

@@ -2,57 +2,192 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32
 from semgp.blocks.covariance import stationary_terms
 from semgp.blocks.link import Link
 from semgp.blocks.members import Sizes
 from semgp.blocks.solve import Noise
+from semgp.errors import InputError
 from semgp.gp.kernels import Kernel
+from semgp.gp.model import kernel_from_json, kernel_to_json
 from semgp.gp.stationary import Matern52, Stationary
+
+CLOSED: Mapping[str, tuple[float, float, float]] = {
+    "pool": (0.5, 0.35, 0.1),
+    "indicator": (1.0, 0.0, 0.0),
+    "log-ratio": (0.0, 1.0, 0.0),
+    "vote": (0.0, 0.0, 1.0),
+}
+"""Posteriors in closed form, with the powers of the indicator, log-ratio and vote predictors in their pool."""
+
+EXPERTS = ("dirichlet", "laplace", "ep", "softmax")
+"""Posteriors that each block solves by itself, class by class: slower, for comparison."""
+
+_POSITIVE = ("resolution", "s_n", "nugget", "a", "delta", "v_0")
+_MOST_MEMBERS = 1024  # a block's covariance is a dense matrix
+
 
 @dataclass(frozen=True)
 class BlockModel:
-    kernel: Kernel = field(default_factory=lambda: Matern52(ell=(.52,.08,.52),sf=.047**.5)+Matern52(ell=(4.5,1.64,4.5),sf=.085**.5))
-    resolution: float = 0.2
-    s_n: float = 1.3
-    nugget: float = 0.054
-    a: float = 0.5
-    delta: float = 0.008
+    """Kernel, noise, link and block sizes of a map of many blocks.
+
+    Parameters
+    ----------
+    kernel : Kernel, optional
+        A sum of stationary kernels over position, in metres, and features.
+    resolution : float, optional
+        Edge of a voxel in metres: labels in one voxel are one site.
+    posterior : str, optional
+        "pool", "indicator", "log-ratio" or "vote", see `semgp.blocks.link`; or "dirichlet", "laplace", "ep",
+        "softmax", see `semgp.blocks.experts`.
+    weights : (float, float, float), optional
+        Powers of the indicator, log-ratio and vote predictors; left out, those that `posterior` names.
+    s_n : float, optional
+        Noise variance of one label.
+    nugget : float, optional
+        Noise variance of a site that more labels do not take away: errors that its labels share.
+    a : float, optional
+        Prior mass, in labels, of log-ratio targets; prior mass of a class for Dirichlet targets.
+    delta : float, optional
+        Floor of the indicator predictor, times the prior.
+    v_0 : float, optional
+        Mass of the prior in the vote.
+    prior : tuple of float, optional
+        Class frequencies, one a class; left out, all alike. Part of the model, so that data in one place do not
+        change the map in another.
+    features : tuple of str, optional
+        Inputs beyond position: names of a cloud's features, or "red", "green", "blue" (0 to 1).
+    leaf, near, far : int, optional
+        A block has at most `leaf` sites of its own, `near` single sites round them (more where it has fewer of its
+        own), and `far` coarse voxels farther out.
+    blend : float, optional
+        Edge, in voxels, of the box over which neighbouring blocks blend.
+
+    Raises
+    ------
+    InputError
+        Numbers out of range, unknown names, a kernel that does not fit.
+    """
+
+    kernel: Kernel = Matern52(ell=(0.15,), sf=0.3) + Matern52(ell=(1.0,), sf=0.4)
+    resolution: float = 0.05
+    posterior: str = "pool"
+    weights: tuple[float, float, float] | None = None
+    s_n: float = 0.3
+    nugget: float = 0.1
+    a: float = 0.25
+    delta: float = 0.005
     v_0: float = 0.05
-    weights: tuple[float, float, float] = (0.5, 0.5, 0.0)
     prior: tuple[float, ...] | None = None
-    n_features: int = 0
+    features: tuple[str, ...] = ()
     leaf: int = 48
     near: int = 16
     far: int = 32
     blend: float = 1.0
 
-    @property
-    def sizes(self) -> Sizes:
-        return Sizes(self.leaf, self.far, self.leaf + self.near + self.far)
+    def __post_init__(self) -> None:
+        if self.posterior not in (*CLOSED, *EXPERTS):
+            raise InputError(f"posterior must be one of {', '.join((*CLOSED, *EXPERTS))}, not {self.posterior!r}.")
+        for name in _POSITIVE:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name} must be positive and finite, not {value}.")
+            object.__setattr__(self, name, float(value))
+        given = CLOSED.get(self.posterior, (0.0, 0.0, 1.0)) if self.weights is None else self.weights
+        powers = tuple(float(w) for w in given)
+        if len(powers) != 3 or not all(math.isfinite(w) and w >= 0 for w in powers) or sum(powers) <= 0:
+            raise InputError(f"weights must be three numbers, none negative, not all zero, not {given}.")
+        object.__setattr__(self, "weights", powers)
+        if self.prior is not None:
+            prior = tuple(float(p) for p in self.prior)
+            if not prior or not all(math.isfinite(p) and p > 0 for p in prior):
+                raise InputError("the prior must have a positive frequency for each class.")
+            object.__setattr__(self, "prior", prior)
+        object.__setattr__(self, "features", tuple(self.features))
+        if self.leaf < 2 or self.near < 0 or self.far < 0 or self.members > _MOST_MEMBERS:
+            raise InputError(f"a block needs 2 own sites at least and {_MOST_MEMBERS} members at most.")
+        if not 0 < self.blend <= 8:
+            raise InputError(f"blend must be above 0 and at most 8 voxels, not {self.blend}.")
+        for term in self.terms:
+            if term.dims is None and len(term.ell) not in (1, self.n_dims):
+                raise InputError(f"{len(term.ell)} length scales do not fit {self.n_dims} inputs.")
 
     @property
-    def solves(self) -> bool:
-        return self.weights[0] > 0 or self.weights[1] > 0
+    def n_dims(self) -> int:
+        """Number of inputs D: three coordinates and the features."""
+        return 3 + len(self.features)
 
-    def noise(self) -> Noise:
-        return Noise(float(self.s_n), float(self.nugget), float(self.a), self.class_prior(len(self.prior or ())), self.solves)
-
-    def link(self) -> Link:
-        prior = self.class_prior(len(self.prior or ()))
-        w_i, w_l, w_v = (np.float32(w) for w in self.weights)
-        return Link(prior, prior ** (w_i + w_l + w_v), np.float32(self.delta), np.float32(self.v_0), w_i, w_l, w_v)
-
-    def class_prior(self, n_classes: int) -> NDArray[np.float32]:
-        if self.prior is None:
-            return np.full(n_classes, 1 / n_classes, np.float32)
-        p = np.asarray(self.prior)
-        return (p / p.sum()).astype(np.float32)
+    @property
+    def members(self) -> int:
+        """Most members of a block."""
+        return self.leaf + self.near + self.far
 
     @property
     def terms(self) -> list[Stationary]:
+        """The terms of the kernel."""
         return stationary_terms(self.kernel)
+
+    @property
+    def powers(self) -> tuple[float, float, float]:
+        """Powers of the three predictors in the pool."""
+        assert self.weights is not None
+        return self.weights
+
+    @property
+    def solves(self) -> bool:
+        """Whether blocks solve the closed form: a vote alone does not, nor do experts."""
+        return self.posterior in CLOSED and (self.powers[0] > 0 or self.powers[1] > 0)
+
+    def fits(self, n_classes: int) -> None:
+        """Raise InputError where the prior is for another number of classes."""
+        if self.prior is not None and len(self.prior) != n_classes:
+            raise InputError(f"the model's prior is for {len(self.prior)} classes, the map has {n_classes}.")
+
+    def class_prior(self, n_classes: int) -> F32:
+        """Return the prior probabilities (C,)."""
+        prior = np.ones(n_classes) if self.prior is None else np.asarray(self.prior)
+        return np.asarray(prior / prior.sum(), dtype=np.float32)
+
+    def sizes(self) -> Sizes:
+        """Return the block sizes for compiled code."""
+        return Sizes(self.leaf, self.far, self.members)
+
+    def noise(self, n_classes: int) -> Noise:
+        """Return what targets and noise depend on, for compiled code."""
+        return Noise(self.s_n, self.nugget, self.a, self.class_prior(n_classes), self.solves)
+
+    def link(self, n_classes: int) -> Link:
+        """Return the link for compiled code."""
+        prior = self.class_prior(n_classes)
+        w_i, w_l, w_v = (np.float32(w) for w in self.powers)
+        return Link(prior, prior ** (w_i + w_l + w_v), np.float32(self.delta), np.float32(self.v_0), w_i, w_l, w_v)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the model as a dictionary ready for JSON."""
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        lists = {name: list(plain[name]) for name in ("weights", "features")}
+        prior = None if self.prior is None else list(self.prior)
+        return plain | lists | {"prior": prior, "kernel": kernel_to_json(self.kernel)}
+
+    @classmethod
+    def from_json(cls, plain: Mapping[str, Any]) -> BlockModel:
+        """Make the model again from what `to_json` gave.
+
+        Raises
+        ------
+        InputError
+            Fields that are missing, unknown or of the wrong kind.
+        """
+        try:
+            prior = None if plain["prior"] is None else tuple(plain["prior"])
+            lists = {"weights": tuple(plain["weights"]), "features": tuple(plain["features"]), "prior": prior}
+            return cls(**{**plain, **lists, "kernel": kernel_from_json(plain["kernel"])})
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"this is no block model: {error}") from error

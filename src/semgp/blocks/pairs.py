@@ -6,17 +6,15 @@ answer changes without a jump, therefore, when a point crosses the border betwee
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, F64, I8, I32, I64, Bool
 from semgp.blocks.sites import CELL, CELL_BITS
 from semgp.blocks.tree import overlapped
 from semgp.voxels import AXIS_BITS, HALF_RANGE, slot_of
-
-F32, F64, I32, I64 = NDArray[np.float32], NDArray[np.float64], NDArray[np.int32], NDArray[np.int64]
 
 _MOST = 64  # leaves of one cell, and blocks in all, that may answer one point
 
@@ -35,25 +33,26 @@ class Pairs(NamedTuple):
 
 
 class CellTrees(NamedTuple):
-    """Cell hash table, and for each cell its first block (-1: none), depth and place of its tree, and the trees."""
+    """Cells by key; for each its first block (-1: none), depth and place of its tree; and all trees."""
 
     slots: I64
     keys: I64
     block: I64
     depth: I32
     tree_at: I64
-    axes: NDArray[np.int8]
+    axes: I8
     cuts: F32
 
 
 @njit(cache=True, nogil=True)
-def cells_of(points: F64, resolution: float, origin: F64, half: float) -> I64:
-    """Return the keys of the cells that the boxes round points overlap, repeated where neighbours share them."""
-    found = np.empty(64, np.int64)
+def mark_cells(
+    points: F64, resolution: float, origin: F64, half: float, slots: I64, keys: I64, needed: Bool
+) -> I64:
+    """Mark the cells that the boxes round points overlap, and return the keys of those that are not known."""
+    unknown = np.empty(64, np.int64)
     n = 0
-    previous = np.int64(-1)
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for i in range(len(points)):
-        low, high = np.empty(3, np.int64), np.empty(3, np.int64)
         inside = True
         for d in range(3):
             v = points[i, d] / resolution - origin[d]
@@ -65,15 +64,15 @@ def cells_of(points: F64, resolution: float, origin: F64, half: float) -> I64:
             for y in range(low[1], high[1] + 1):
                 for z in range(low[2], high[2] + 1):
                     key = _key(x, y, z)
-                    if key != previous:
-                        if n == len(found):
-                            longer = np.empty(2 * n, np.int64)
-                            longer[:n] = found
-                            found = longer
-                        found[n] = key
+                    cell = slots[slot_of(key, slots, keys)]
+                    if cell >= 0:
+                        needed[cell] = True
+                    elif n == 0 or unknown[n - 1] != key:
+                        if n == len(unknown):
+                            unknown = _longer(unknown, 2 * n)
+                        unknown[n] = key
                         n += 1
-                        previous = key
-    return found[:n]
+    return unknown[:n]
 
 
 @njit(cache=True, nogil=True)
@@ -181,7 +180,7 @@ def _share(v: float, half: float, x: int, low: int, high: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _longer(a: NDArray[np.generic], n: int) -> NDArray[np.generic]:
+def _longer(a: Any, n: int) -> Any:
     out = np.empty(n, a.dtype)
     out[: len(a)] = a
     return out

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, I16, I32, I64
 from semgp.blocks.solve import SHARED, Solved
-
-F32, I32, I64 = NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]
 
 
 class Patch(NamedTuple):
@@ -21,7 +19,7 @@ class Patch(NamedTuple):
 
     X: F32
     k: F32
-    present: NDArray[np.int16]
+    present: I16
     mass: F32
     Y: F32
     label: I32
@@ -38,12 +36,12 @@ def patch(solved: Solved, b: int, Y: F32, label: I32) -> Patch:
 
 
 class Packed(NamedTuple):
-    """Patches in flat arrays: sizes (B, 3) of n, P and m, and their members, classes, masses and points in turn."""
+    """Patches in flat arrays: sizes (B, 3) of n, P and m, and members, classes, masses and points in turn."""
 
     sizes: I64
     X: F32
     k: F32
-    present: NDArray[np.int16]
+    present: I16
     mass: F32
     Y: F32
     label: I32

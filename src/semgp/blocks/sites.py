@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, F64, I32, I64, U32
 from semgp.errors import InputError
 from semgp.voxels import HALF_RANGE, VoxelTable, voxel_keys, voxel_origin
 
@@ -48,7 +49,7 @@ class Sites:
 
     def __init__(self, n_classes: int, n_features: int, resolution: float) -> None:
         self.resolution = resolution
-        self.origin: NDArray[np.int64] | None = None
+        self.origin: I64 | None = None
         self.voxels, self.cells = VoxelTable(), VoxelTable()
         self._mass = np.zeros((0, n_classes), dtype=np.uint32)
         self._place = np.zeros((0, 3 + n_features), dtype=np.int64)
@@ -61,32 +62,32 @@ class Sites:
         return len(self.voxels)
 
     @property
-    def mass(self) -> NDArray[np.uint32]:
+    def mass(self) -> U32:
         """Class mass (S, C) in steps of 1 / `MASS_UNIT`."""
         return self._mass[: len(self)]
 
     @property
-    def place(self) -> NDArray[np.int64]:
+    def place(self) -> I64:
         """Mass times position within the voxel and features, summed (S, 3 + F)."""
         return self._place[: len(self)]
 
     @property
-    def head(self) -> NDArray[np.int32]:
+    def head(self) -> I32:
         """First site of each cell, -1 for none."""
         return self._head[: len(self.cells)]
 
     @property
-    def size(self) -> NDArray[np.int32]:
+    def size(self) -> I32:
         """Number of sites of each cell."""
         return self._size[: len(self.cells)]
 
     @property
-    def next(self) -> NDArray[np.int32]:
+    def next(self) -> I32:
         """The site that follows each site in its cell, -1 for none."""
         return self._next[: len(self)]
 
     @property
-    def positions(self) -> NDArray[np.float64]:
+    def positions(self) -> F64:
         """Positions (S, 3) in metres, world frame."""
         if self.origin is None:
             return np.empty((0, 3))
@@ -104,11 +105,11 @@ class Sites:
 
     def add(
         self,
-        points: NDArray[np.float64],
-        labels: NDArray[np.int32] | None,
-        weights: NDArray[np.float32] | None,
-        features: NDArray[np.float32],
-    ) -> NDArray[np.int32]:
+        points: F64,
+        labels: I32 | None,
+        weights: F32 | None,
+        features: F32,
+    ) -> I32:
         """Add labelled points, hard or soft, and return the cells that they lie in.
 
         Raises
@@ -136,7 +137,7 @@ class Sites:
         touched[self._cell[rows]] = True
         return np.flatnonzero(touched).astype(np.int32)
 
-    def cell_ids(self, keys: NDArray[np.int64]) -> NDArray[np.int32]:
+    def cell_ids(self, keys: I64) -> I32:
         """Return the cells of cell keys; those not met before are new, and empty."""
         ids = self.cells.insert(keys).astype(np.int32)
         self._head = _extended(self._head, len(self.cells), -1)
@@ -187,7 +188,7 @@ class Sites:
         self._link(0)
 
 
-def cell_keys(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+def cell_keys(keys: I64) -> I64:
     """Return the keys of the cells that voxels lie in: those of their lowest voxels."""
     low = (1 << CELL_BITS) - 1
     return keys & ~np.int64(low << 42 | low << 21 | low)
@@ -205,11 +206,11 @@ def _extended(a: NDArray[Any], n: int, fill: int) -> NDArray[Any]:
 
 @njit(cache=True, nogil=True)
 def _chain(
-    cells: NDArray[np.int32],
+    cells: I32,
     known: int,
-    head: NDArray[np.int32],
-    size: NDArray[np.int32],
-    following: NDArray[np.int32],
+    head: I32,
+    size: I32,
+    following: I32,
 ) -> None:
     for i in range(len(cells)):
         c = cells[i]
@@ -220,12 +221,12 @@ def _chain(
 
 @njit(cache=True, nogil=True)
 def _add_hard(
-    rows: NDArray[np.int64],
-    labels: NDArray[np.int32],
-    fraction: NDArray[np.float64],
-    features: NDArray[np.float32],
-    mass: NDArray[np.uint32],
-    place: NDArray[np.int64],
+    rows: I64,
+    labels: I32,
+    fraction: F64,
+    features: F32,
+    mass: U32,
+    place: I64,
 ) -> None:
     for i in range(len(rows)):
         mass[rows[i], labels[i]] += np.uint32(MASS_UNIT)
@@ -234,12 +235,12 @@ def _add_hard(
 
 @njit(cache=True, nogil=True)
 def _add_soft(
-    rows: NDArray[np.int64],
-    weights: NDArray[np.float32],
-    fraction: NDArray[np.float64],
-    features: NDArray[np.float32],
-    mass: NDArray[np.uint32],
-    place: NDArray[np.int64],
+    rows: I64,
+    weights: F32,
+    fraction: F64,
+    features: F32,
+    mass: U32,
+    place: I64,
 ) -> None:
     for i in range(len(rows)):
         total = 0
@@ -251,9 +252,7 @@ def _add_soft(
 
 
 @njit(cache=True, nogil=True)
-def _add_place(
-    row: int, w: int, fraction: NDArray[np.float64], features: NDArray[np.float32], place: NDArray[np.int64]
-) -> None:
+def _add_place(row: int, w: int, fraction: F64, features: F32, place: I64) -> None:
     for d in range(3):
         place[row, d] += w * int(np.rint(fraction[d] * PLACE_UNIT))
     for f in range(len(features)):

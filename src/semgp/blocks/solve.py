@@ -15,22 +15,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F32, I8, I16, I32, I64
 from semgp.blocks.covariance import Mixture, covariance_tile
 from semgp.blocks.layout import Layout
 from semgp.blocks.linear import inverse_factor
 from semgp.blocks.members import Members, Sizes, gather
-from semgp.blocks.tree import split, tree_depth
-
-F32, I32, I64 = NDArray[np.float32], NDArray[np.int32], NDArray[np.int64]
+from semgp.blocks.tree import split
 
 SHARED = 3
 """Rows of coefficients that do not belong to one class: absent indicator, absent log-ratio, vote of all mass."""
 
 
 class Noise(NamedTuple):
-    """What the targets and their noise depend on: s_n, nugget, a, the prior pi (C,), and whether to solve at all."""
+    """What targets and noise depend on: s_n, nugget, a, the prior pi (C,), and whether to solve at all."""
 
     s_n: float
     nugget: float
@@ -42,16 +40,17 @@ class Noise(NamedTuple):
 class Solved(NamedTuple):
     """Posteriors of some cells' blocks, one after the other.
 
-    n (B,): members. X (B, D, total), k (B, total): their positions and the sites they join. n_present (B,), present (B, C): the classes with mass in
-    the block. at (B + 1,), coefficients: where in the flat array each block's (3 + 3 P, n) coefficients begin.
-    at_factor (B + 1,), factor: the same for the inverse Cholesky factors (n, n).
+    n (B,): members. X (B, D, total), k (B, total): their positions, and the sites that they join. n_present (B,),
+    present (B, C): the classes with mass in the block. at (B + 1,), coefficients: where in the flat array each
+    block's (3 + 3 P, n) coefficients begin. at_factor (B + 1,), factor: the same for the inverse Cholesky factors
+    (n, n).
     """
 
     n: I32
     X: F32
     k: F32
     n_present: I32
-    present: NDArray[np.int16]
+    present: I16
     at: I64
     coefficients: F32
     at_factor: I64
@@ -67,10 +66,10 @@ def solve_cells(
     sizes: Sizes,
     kernel: Mixture,
     noise: Noise,
+    depths: I32,
     tree_at: I64,
-    axes: NDArray[np.int8],
+    axes: I8,
     cuts: F32,
-    block_at: I64,
 ) -> Solved:
     """Split cells into blocks and solve each.
 
@@ -80,21 +79,21 @@ def solve_cells(
         The cells and those round about.
     places : (n,) array
         Places of the cells in the layout.
-    around : (L, 27) array
-        Places of the cells round about each cell of the layout, -1 for none.
+    around : (n, 27) array
+        Places of the cells round about each, -1 for none.
     edge : float
         Edge of a cell in metres.
     sizes, kernel, noise
         The model.
-    tree_at : (n,) array
-        Where each cell's tree begins in `axes` and `cuts`, which are filled in.
+    depths, tree_at : (n,) arrays
+        Depth of each cell's tree, and where it begins in `axes` and `cuts`.
     axes, cuts : arrays
-        The trees' planes.
-    block_at : (n + 1,) array
-        Where each cell's blocks begin.
+        The trees' planes, filled in.
     """
     T, D, C = sizes.total, layout.X.shape[1], layout.mass.shape[1]
-    first, B = block_at[0], block_at[len(places)] - block_at[0]
+    B = 0
+    for depth in depths:
+        B += 1 << depth
     solved = Solved(
         np.zeros(B, np.int32),
         np.empty((B, D, T), np.float32),
@@ -108,21 +107,19 @@ def solve_cells(
     )
     coefficients = solved.coefficients
     marks = np.full(len(layout.row), -1, np.int32)
-    members = Members(
-        np.empty((D, T), np.float32), np.empty((T, C), np.float32), np.empty(T, np.float32)
-    )
+    members = Members(np.empty((D, T), np.float32), np.empty((T, C), np.float32), np.empty(T, np.float32))
     K, work = np.empty(T * T, np.float32), np.empty(T, np.float32)
+    b = -1
     for i in range(len(places)):
-        cell = places[i]
+        cell, depth = places[i], depths[i]
         a, n_sites = layout.start[cell], layout.start[cell + 1] - layout.start[cell]
-        depth = tree_depth(n_sites, sizes.leaf)
         order, bounds = np.empty(n_sites, np.int64), np.empty((1 << depth) + 1, np.int64)
         t, size = tree_at[i], (1 << depth) - 1
         split(layout.X[a : a + n_sites], order, depth, axes[t : t + size], cuts[t : t + size], bounds)
         for leaf in range(1 << depth):
-            b = block_at[i] - first + leaf
+            b += 1
             own = order[bounds[leaf] : bounds[leaf + 1]] + a
-            n = gather(layout, around[cell], own, edge, sizes, marks, np.int32(b), members)
+            n = gather(layout, around[i], own, edge, sizes, marks, b, members)
             P = _present(members.mass, n, solved.present[b])
             W = SHARED + 3 * P
             if solved.at[b] + W * n > len(coefficients):
@@ -156,7 +153,7 @@ def solve_cells(
 
 
 @njit(cache=True, nogil=True)
-def _present(mass: F32, n: int, present: NDArray[np.int16]) -> int:
+def _present(mass: F32, n: int, present: I16) -> int:
     """Fill in the classes that have mass, in ascending order, and return their number."""
     P = 0
     for c in range(mass.shape[1]):
@@ -173,7 +170,7 @@ def solve_block(
     X: F32,
     k: F32,
     n: int,
-    present: NDArray[np.int16],
+    present: I16,
     kernel: Mixture,
     noise: Noise,
     rows: F32,
@@ -212,7 +209,7 @@ def solve_block(
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _targets(rows: F32, n: int, present: NDArray[np.int16], noise: Noise) -> None:
+def _targets(rows: F32, n: int, present: I16, noise: Noise) -> None:
     """Fill in the targets, one row each: 1, absent log-ratio, indicators, log-ratios.
 
     The first row is solved to A^-1 1: an absent class has the indicator -pi_c everywhere.

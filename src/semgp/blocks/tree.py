@@ -8,23 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-F32 = NDArray[np.float32]
-Int = NDArray[np.int64]
+from semgp.blocks.arrays import F32, I8, I64
 
-
-@njit(cache=True, nogil=True)
-def tree_depth(n: int, leaf: int) -> int:
-    """Return the depth of the tree of n sites with at most `leaf` of them in each leaf."""
-    depth = 0
-    while n > leaf << depth:
-        depth += 1
-    return depth
+Int = I64
 
 
 @njit(cache=True, nogil=True)
-def split(X: F32, order: Int, depth: int, axes: NDArray[np.int8], cuts: F32, bounds: Int) -> None:
+def split(X: F32, order: Int, depth: int, axes: I8, cuts: F32, bounds: Int) -> None:
     """Sort the sites X (n, D) into the leaves of a tree: halves along the widest of the three coordinates.
 
     Fills in `order` (n,), the sites leaf by leaf; `bounds` (2^depth + 1,), where each leaf begins in it; and
@@ -88,9 +79,7 @@ def _select(X: F32, order: Int, a: int, b: int, k: int, axis: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def overlapped(
-    axes: NDArray[np.int8], cuts: F32, start: int, depth: int, low: F32, high: F32, leaves: Int, shares: F32
-) -> int:
+def overlapped(axes: I8, cuts: F32, start: int, depth: int, low: F32, high: F32, leaves: Int, shares: F32) -> int:
     """Find the leaves of the tree at `start` that a box overlaps, with the share of the box in each.
 
     Returns the number of leaves; fills in `leaves` and `shares`. The shares add up to one.

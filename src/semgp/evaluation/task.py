@@ -64,11 +64,14 @@ class Built:
         Labelled points that it was built from.
     fit_seconds : float, optional
         Seconds that building it takes, where some of the work was done before for another method.
+    learn_seconds : float, optional
+        Seconds that learning its settings took, where that is not a part of building it.
     """
 
     semantic_map: SemanticMap
     n_train: int
     fit_seconds: float | None = None
+    learn_seconds: float = 0.0
 
 
 def of_all(semantic_map: SemanticMap, task: Task) -> Built:
@@ -99,6 +102,7 @@ class Result:
     fit_seconds: float
     query_seconds: float
     peak_rss_mb: float
+    learn_seconds: float = 0.0
 
     def row(self) -> dict[str, Any]:
         """Return the row, ready for JSON; all scores are fractions from 0 to 1 but the NLL, in nats."""
@@ -114,6 +118,7 @@ class Result:
             "n_classes": int(np.isfinite(s.auc).sum()),
             "fit_seconds": round(self.fit_seconds, 3),
             "query_seconds": round(self.query_seconds, 3),
+            "learn_seconds": round(self.learn_seconds, 3),
             "peak_rss_mb": round(self.peak_rss_mb, 1),
             "scores": s.to_json(),
         }
@@ -138,4 +143,5 @@ def run(task: Task, name: str, method: Method) -> Result:
         fit_seconds=fit_seconds if built.fit_seconds is None else built.fit_seconds,
         query_seconds=query_seconds,
         peak_rss_mb=peak,
+        learn_seconds=built.learn_seconds,
     )

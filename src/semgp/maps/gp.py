@@ -1,4 +1,4 @@
-"""The Gaussian-process semantic map of the paper: one expert for the whole scan."""
+"""The Gaussian-process semantic map."""
 
 from __future__ import annotations
 
@@ -8,32 +8,31 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from semgp.blocks.model import BlockModel
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.gp.expert import Expert, fit_expert, restore_expert
 from semgp.gp.model import GPModel
+from semgp.maps.blocks import ManyBlocks
 from semgp.maps.protocol import query_points, training_part
-from semgp.maps.training import TrainingSet, training_set
+from semgp.maps.whole import WholeScan
 from semgp.prediction import Prediction
-
-UNEXPLAINED = 0.95
-"""A point whose latent variance is above this share of the prior's, for every class, counts as not observed."""
 
 
 class GPSemanticMap:
-    """Continuous semantic map: class probabilities and uncertainty at any point (paper, section IV).
+    """Continuous semantic map: class probabilities and uncertainty at any point.
 
-    Labels become training points of one-vs-rest Gaussian-process classifiers, or of a softmax one, as the model
-    says. The posterior is computed when first asked for; updates never change the model.
+    The model decides how labels become a posterior. With a `BlockModel`, the map for real work, the labels of all
+    scans add up in sites, in many blocks; only blocks whose data changed are solved again, when they are next
+    asked. With a `GPModel`, the paper's map (section IV), a subset of the labels is one training set: one block.
+    Updates never change the model.
 
     Parameters
     ----------
     classes : Classes
-        The map's classes. One that no training point has costs nothing; its probability is that of one
-        observation among all, 1 / (n + C).
-    model : GPModel, optional
-        Kernel, likelihood, inference; see `semgp.maps.learning.learn_model`.
+        The map's classes, any number.
+    model : BlockModel or GPModel, optional
+        See `semgp.blocks.learning.learn_blocks`, `semgp.maps.presets` and `semgp.maps.learning.learn_model`.
 
     Raises
     ------
@@ -43,14 +42,10 @@ class GPSemanticMap:
 
     kind = "gp"
 
-    def __init__(self, classes: Classes, model: GPModel | None = None) -> None:
+    def __init__(self, classes: Classes, model: BlockModel | GPModel | None = None) -> None:
         self.classes = classes
-        self.model = model or GPModel()
-        self.model.fits(len(classes))
-        self._points = np.empty((0, 3))
-        self._weights = np.empty((0, len(classes)), dtype=np.float32)
-        self._training: TrainingSet | None = None
-        self._expert: Expert | None = None
+        self.model = BlockModel() if model is None else model
+        self._state = _state(classes, self.model)
 
     def update(self, cloud: LabelledCloud) -> None:
         """Add the labelled points of a cloud; the posterior follows at the next query.
@@ -58,74 +53,70 @@ class GPSemanticMap:
         Raises
         ------
         InputError
-            Classes that differ from the map's.
+            Classes that differ from the map's, features that are missing, or points too far from the first.
         """
-        part = training_part(cloud, self.classes)
-        self._points = np.concatenate([self._points, part.points])
-        self._weights = np.concatenate([self._weights, part.class_weights])
-        self._training = self._expert = None
+        self._state.add(training_part(cloud, self.classes))
 
-    def query(self, points: ArrayLike) -> Prediction:
-        """Return class probabilities, latent mean and variance at points (M, 3), metres, world frame.
+    def query(self, points: ArrayLike, features: ArrayLike | None = None) -> Prediction:
+        """Return class probabilities, latent mean and variance at points.
+
+        Parameters
+        ----------
+        points : (M, 3) array
+            Metres, world frame.
+        features : (M, F) array, optional
+            The model's inputs beyond position. Where they are NaN, or left out, a point takes those of the nearest
+            member of its block.
 
         Raises
         ------
         InputError
-            Points that cannot be used, or a map without a single labelled point.
+            Points or features that cannot be used, or a map without a single labelled point.
         """
-        X = query_points(points)
-        training, expert = self._posterior()
-        p, f, s2 = expert.predict(X - training.origin)
-        M, C = len(X), len(self.classes)
-        # Laplace's rule of succession for the classes that were never seen
-        unseen = 1 / (len(training.X) + C)
-        probability, mean, variance = np.full((M, C), unseen), np.zeros((M, C)), np.zeros((M, C))
-        probability[:, training.present] = p * (1 - unseen * (C - len(training.present)))
-        prior = np.array([self.model.kernel(c).diag(training.X[:1])[0] for c in range(C)])
-        mean += [self.model.mean(c) for c in range(C)]
-        variance += prior
-        mean[:, training.present], variance[:, training.present] = f, s2
-        observed = np.asarray((variance < UNEXPLAINED * prior).any(axis=1))
-        return Prediction(self.classes, probability, observed, mean, variance)
+        known = None if features is None else np.ascontiguousarray(features, dtype=np.float32)
+        return self._state.answer(query_points(points), known)
 
-    def solve(self) -> Expert:
-        """Compute the posterior now, if it is not up to date, and return it."""
-        return self._posterior()[1]
+    def solve(self) -> None:
+        """Bring the posterior up to date now instead of at the next query."""
+        self._state.solve()
 
-    def _posterior(self) -> tuple[TrainingSet, Expert]:
-        if self._training is None or self._expert is None:
-            training = training_set(self.model, self._points, self._weights)
-            self._expert = fit_expert(self.model, training.present, training.X, training.weights)
-            self._training = training
-        return self._training, self._expert
+    def crop(self, low: ArrayLike, high: ArrayLike) -> GPSemanticMap:
+        """Return the map of what lies in a box, from `low` (included) to `high` (left out), metres.
+
+        Near the border its answers differ from the whole map's: what lay outside is forgotten.
+
+        Raises
+        ------
+        InputError
+            Corners that are not three numbers each, or not in order.
+        """
+        a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
+            raise InputError(
+                f"a box needs two corners (3,), each below the other, not {a.tolist()} and {b.tolist()}."
+            )
+        part = GPSemanticMap(self.classes, self.model)
+        part._state = self._state.crop(lambda X: np.asarray(((a <= X) & (b > X)).all(axis=1)))
+        return part
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """Labelled points (N, 3), metres."""
-        return self._points
+        """Sites or labelled points (n, 3), metres."""
+        return self._state.positions
 
     def __len__(self) -> int:
-        return len(self._points)
+        """Return the number of sites, or of labelled points."""
+        return len(self._state)
 
     def info(self) -> dict[str, Any]:
-        """Return the model, counts, convergence and memory, ready for JSON."""
-        names = self.classes.names
-        known: dict[str, Any] = {"labelled_points": len(self)}
-        if self._training is not None and self._expert is not None:
-            known["training_points"] = len(self._training.X)
-            known["classes_present"] = [names[c] for c in self._training.present]
-            known["nlml"], known["converged"] = self._expert.nlml, self._expert.converged
-        known["memory_bytes"] = self._points.nbytes + self._weights.nbytes
-        return {"kind": self.kind, "classes": list(names), "model": self.model.to_json(), **known}
+        """Return the model, counts and memory, ready for JSON."""
+        described = {"kind": self.kind, "classes": list(self.classes.names), "model": self.model.to_json()}
+        return described | self._state.info()
 
     def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Return a header ready for JSON and plain arrays from which `from_arrays` makes the same map."""
-        header: dict[str, Any] = {"model": self.model.to_json(), "solved": self._expert is not None}
-        arrays: dict[str, NDArray[Any]] = {"points": self._points, "weights": self._weights}
-        if self._expert is not None:
-            header |= {"nlml": self._expert.nlml, "converged": self._expert.converged}
-            arrays |= {f"expert.{name}": value for name, value in self._expert.arrays().items()}
-        return header, arrays
+        header, arrays = self._state.to_arrays()
+        return {"blocks": isinstance(self.model, BlockModel), **header}, arrays
 
     @classmethod
     def from_arrays(cls, classes: Classes, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
@@ -136,15 +127,15 @@ class GPSemanticMap:
         InputError
             A header or arrays that do not belong together.
         """
-        gp_map = cls(classes, GPModel.from_json(header["model"]))
-        gp_map.update(LabelledCloud(arrays["points"], classes, weights=arrays["weights"]))
-        if header["solved"]:
-            training = training_set(gp_map.model, gp_map._points, gp_map._weights)
-            expert = {name.removeprefix("expert."): a for name, a in arrays.items() if name.startswith("expert.")}
-            if expert["A"].shape != (len(training.X), len(training.present)):
-                raise InputError("the posterior does not fit the training points.")
-            gp_map._training = training
-            gp_map._expert = restore_expert(
-                gp_map.model, training.present, training.X, expert, header["nlml"], header["converged"]
-            )
-        return gp_map
+        state = (ManyBlocks if header["blocks"] else WholeScan).from_arrays(classes, header, arrays)
+        made = cls(classes, state.model)
+        made._state = state
+        return made
+
+
+def _state(classes: Classes, model: BlockModel | GPModel) -> ManyBlocks | WholeScan:
+    if isinstance(model, BlockModel):
+        return ManyBlocks(classes, model)
+    if isinstance(model, GPModel):
+        return WholeScan(classes, model)
+    raise InputError(f"the model must be a BlockModel or a GPModel, not {type(model).__name__}.")

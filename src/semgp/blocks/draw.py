@@ -1,0 +1,68 @@
+"""Draw patches: blocks of a map of some clouds, with labels of other clouds in their leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from semgp.blocks.arrays import F32, F64, I64
+from semgp.blocks.field import Field
+from semgp.blocks.inputs import add_cloud, cloud_features
+from semgp.blocks.model import BlockModel
+from semgp.blocks.patches import Patch, patch
+from semgp.cloud import LabelledCloud
+
+Trial = tuple[Sequence[LabelledCloud], Sequence[LabelledCloud]]
+"""Clouds that give a map its labels, and clouds that judge it."""
+
+HELD_OUT = 32
+"""At most so many of the judges' points in a patch."""
+
+_POINT = 1e-6  # edge in voxels of a box that lies in one leaf
+
+
+def draw_patches(
+    model: BlockModel,
+    training: Sequence[LabelledCloud],
+    judges: Sequence[LabelledCloud],
+    n: int,
+    rng: np.random.Generator,
+) -> list[Patch]:
+    """Return the blocks of a map of the training clouds that hold n of the judges' points, drawn at random.
+
+    A block that was drawn twice comes once, with at most `HELD_OUT` of the judges' points in its leaf.
+    """
+    # the members are enough: a vote need not be solved
+    field = Field(replace(model, posterior="vote", weights=(0.0, 0.0, 1.0)), len(training[0].classes))
+    for cloud in training:
+        add_cloud(field, cloud)
+    labelled = [c[c.labelled] for c in judges]
+    points = np.concatenate([c.points for c in labelled])
+    labels = np.concatenate([c.hard_labels for c in labelled])
+    features = np.concatenate([cloud_features(c, model.features) for c in labelled])
+    if not len(points) or not len(field.sites):
+        return []
+    shuffled = rng.permutation(len(points))
+    drawn = _blocks(field, points[shuffled[:n]], solve=True)[0]
+    block, local = _blocks(field, points[shuffled], solve=False)
+    order = np.argsort(block, kind="stable")
+    ranked = block[order]
+    patches = []
+    for b in np.unique(drawn[drawn >= 0]):
+        begin, end = np.searchsorted(ranked, [b, b + 1])
+        here = order[begin : min(end, begin + HELD_OUT)]
+        piece = field.store.piece_of(int(b))
+        if len(here) and piece.solved.n[b - piece.first]:
+            rows = shuffled[here]
+            Y = np.concatenate([local[here], features[rows]], axis=1)
+            patches.append(patch(piece.solved, int(b - piece.first), Y, labels[rows]))
+    return patches
+
+
+def _blocks(field: Field, points: F64, solve: bool) -> tuple[I64, F32]:
+    """The block (M,) whose leaf each point lies in, -1 for none, and the point's place (M, 3) in its cell."""
+    pairs = field.pairs(points, _POINT, solve)
+    first = np.flatnonzero(pairs.rank == 0)
+    return pairs.block[first], pairs.local[first]

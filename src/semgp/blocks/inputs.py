@@ -1,0 +1,47 @@
+"""From labelled clouds to the arrays that a field takes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from semgp.blocks.arrays import F32
+from semgp.blocks.field import Field
+from semgp.cloud import LabelledCloud
+from semgp.errors import InputError
+
+COLOURS = ("red", "green", "blue")
+
+
+def add_cloud(field: Field, cloud: LabelledCloud) -> None:
+    """Add the labelled points of a cloud to a field.
+
+    Raises
+    ------
+    InputError
+        A cloud without the features that the model asks for, or points a million voxels from the first.
+    """
+    labelled = cloud.labelled
+    part = cloud if labelled.all() else cloud[labelled]
+    weights = None if part.labels is not None else part.class_weights
+    field.add(part.points, part.labels, weights, cloud_features(part, field.model.features))
+
+
+def cloud_features(cloud: LabelledCloud, names: tuple[str, ...]) -> F32:
+    """Return features (N, F) of a cloud by name: its own, or red, green and blue between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        A name that the cloud does not have.
+    """
+    columns = np.empty((len(cloud), len(names)), dtype=np.float32)
+    for i, name in enumerate(names):
+        if cloud.features is not None and name in cloud.feature_names:
+            columns[:, i] = cloud.features[:, cloud.feature_names.index(name)]
+        elif cloud.colours is not None and name in COLOURS:
+            columns[:, i] = cloud.colours[:, COLOURS.index(name)] / np.float32(255)
+        else:
+            colours = () if cloud.colours is None else COLOURS
+            known = ", ".join((*cloud.feature_names, *colours)) or "none"
+            raise InputError(f"the model asks for the feature {name!r}, the cloud has: {known}.")
+    return columns

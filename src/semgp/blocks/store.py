@@ -1,0 +1,135 @@
+"""Solved blocks: which cell has which, their trees, and the pieces in which they were solved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from semgp.blocks.arrays import F32, I8, I32, I64
+from semgp.blocks.experts import BlockExpert
+from semgp.blocks.pairs import CellTrees
+from semgp.blocks.solve import Solved
+from semgp.voxels import VoxelTable
+
+
+@dataclass
+class Piece:
+    """Cells that one thread solved together.
+
+    Parameters
+    ----------
+    first : int
+        Number of the first of the piece's blocks; the others follow.
+    solved : Solved
+        Their posteriors.
+    cells : int
+        How many of the map's cells have their blocks here; the piece is dropped when there are none.
+    experts : dict
+        Posteriors that blocks solve by themselves, made when first asked for.
+    """
+
+    first: int
+    solved: Solved
+    cells: int
+    experts: dict[int, BlockExpert] = field(default_factory=dict)
+
+
+class BlockStore:
+    """The blocks of the cells, by cell number.
+
+    Numbers of blocks are given once: a cell that is solved again gets new ones.
+    """
+
+    def __init__(self) -> None:
+        self.stale = np.empty(0, dtype=bool)
+        self.pieces: dict[int, Piece] = {}
+        self.next_block = 0
+        self._block, self._tree_at = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+        self._depth, self._piece = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64)
+        self._axes, self._cuts = np.empty(0, dtype=np.int8), np.empty(0, dtype=np.float32)
+
+    def grow(self, n_cells: int, stale: bool) -> None:
+        """Make room for cells that were not known before."""
+        new = n_cells - len(self.stale)
+        if new > 0:
+            self.stale = np.append(self.stale, np.full(new, stale))
+            self._block = np.append(self._block, np.full(new, -1))
+            self._piece = np.append(self._piece, np.full(new, -1))
+            self._tree_at = np.append(self._tree_at, np.zeros(new, dtype=np.int64))
+            self._depth = np.append(self._depth, np.zeros(new, dtype=np.int32))
+
+    def replace(
+        self,
+        cells: I32,
+        depth: I32,
+        block_at: I64,
+        parts: Sequence[slice],
+        solved: Sequence[Solved],
+        axes: I8,
+        cuts: F32,
+    ) -> None:
+        """Take in cells that were solved, in parts; what they had before is dropped."""
+        for part, piece in zip(parts, solved):
+            first = int(block_at[part.start])
+            for old in self._piece[cells[part]]:
+                self._release(int(old))
+            self.pieces[first] = Piece(first, piece, part.stop - part.start)
+            self._piece[cells[part]] = first
+        self._compact_trees(cells)
+        sizes = (1 << depth.astype(np.int64)) - 1
+        self._tree_at[cells] = len(self._axes) + np.concatenate([[0], sizes.cumsum()[:-1]])
+        self._axes, self._cuts = np.concatenate([self._axes, axes]), np.concatenate([self._cuts, cuts])
+        self._block[cells], self._depth[cells] = block_at[:-1], depth
+        self.next_block = int(block_at[-1])
+        self.stale[cells] = False
+
+    def trees(self, cells: VoxelTable) -> CellTrees:
+        """Return what compiled code needs to find the blocks of points."""
+        return CellTrees(cells.slots, cells.keys, self._block, self._depth, self._tree_at, self._axes, self._cuts)
+
+    def jobs(self, block: I64, order: I64, size: int) -> Iterator[tuple[Piece | None, I64]]:
+        """Split pairs, of ascending blocks (n,), by piece (None: no block) and to at most `size` of them."""
+        firsts = np.array(sorted(self.pieces), dtype=np.int64)
+        edges = np.searchsorted(block, np.append(firsts, self.next_block))
+        if edges[0] > 0:
+            yield None, order[: edges[0]]
+        for first, a, b in zip(firsts, edges[:-1], edges[1:]):
+            for start in range(a, b, size):
+                yield self.pieces[int(first)], order[start : min(start + size, b)]
+
+    def piece_of(self, block: int) -> Piece:
+        """Return the piece that holds a block."""
+        return self.pieces[max(first for first in self.pieces if first <= block)]
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of blocks that are in use."""
+        return int((1 << self._depth[self._block >= 0].astype(np.int64)).sum())
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of all posteriors and trees."""
+        solved = sum(a.nbytes for piece in self.pieces.values() for a in piece.solved)
+        return solved + self._axes.nbytes + self._cuts.nbytes
+
+    def _release(self, first: int) -> None:
+        if first >= 0:
+            self.pieces[first].cells -= 1
+            if self.pieces[first].cells == 0:
+                del self.pieces[first]
+
+    def _compact_trees(self, dropped: I32) -> None:
+        """Rewrite the trees without those of `dropped` cells once more than half of them are of no use."""
+        keep = self._block >= 0
+        keep[dropped] = False
+        cells = np.flatnonzero(keep)
+        sizes = (1 << self._depth[cells].astype(np.int64)) - 1
+        total = int(sizes.sum())
+        if 2 * total >= len(self._axes):
+            return
+        starts = np.concatenate([[0], sizes.cumsum()[:-1]]).astype(np.int64)
+        source = np.repeat(self._tree_at[cells] - starts, sizes) + np.arange(total)
+        self._axes, self._cuts = self._axes[source], self._cuts[source]
+        self._tree_at[cells] = starts
