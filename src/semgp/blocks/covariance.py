@@ -65,34 +65,48 @@ def stationary_terms(kernel: Kernel) -> list[Stationary]:
     raise InputError(f"blocks take sums of stationary kernels, not {type(kernel).__name__}.")
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def covariance_tile(Z: F32, n: int, X: F32, m: int, kernel: Mixture, K: F32, work: F32) -> None:
     """Fill K (n, m) with the covariances between the first n columns of Z (D, .) and the first m of X (D, .).
 
     Fast arithmetic on purpose: sums are reassociated and the exponential is a polynomial, right to 2e-7.
     """
-    kind, weight, variance = kernel
     for j in range(n):
-        row = K[j]
-        for q in range(m):
-            row[q] = 0
-        for k in range(len(kind)):
-            _scaled_squares(Z, j, X, m, weight[k], work)
-            s = variance[k]
-            if kind[k] == 0:
-                for q in range(m):
-                    row[q] += s * exp_minus(np.sqrt(work[q]))
-            elif kind[k] == 1:
-                for q in range(m):
-                    t = np.sqrt(work[q])
-                    row[q] += s * (_ONE + t) * exp_minus(t)
-            elif kind[k] == 2:
-                for q in range(m):
-                    t = np.sqrt(work[q])
-                    row[q] += s * (_ONE + t + t * t * _THIRD) * exp_minus(t)
-            else:
-                for q in range(m):
-                    row[q] += s * exp_minus(work[q])
+        _covariance_row(Z, j, X, m, kernel, K[j], work)
+
+
+@njit(cache=True, nogil=True)
+def covariance_lower(Z: F32, n: int, kernel: Mixture, K: F32, work: F32) -> None:
+    """Fill the lower triangle of K (n, n) with the covariances of the first n columns of Z (D, .).
+
+    What lies above the diagonal is of no meaning.
+    """
+    for j in range(n):
+        _covariance_row(Z, j, Z, min((j | 15) + 1, n), kernel, K[j], work)  # whole vectors
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _covariance_row(Z: F32, j: int, X: F32, m: int, kernel: Mixture, row: F32, work: F32) -> None:
+    kind, weight, variance = kernel
+    for q in range(m):
+        row[q] = 0
+    for k in range(len(kind)):
+        _scaled_squares(Z, j, X, m, weight[k], work)
+        s = variance[k]
+        if kind[k] == 0:
+            for q in range(m):
+                row[q] += s * exp_minus(np.sqrt(work[q]))
+        elif kind[k] == 1:
+            for q in range(m):
+                t = np.sqrt(work[q])
+                row[q] += s * (_ONE + t) * exp_minus(t)
+        elif kind[k] == 2:
+            for q in range(m):
+                t = np.sqrt(work[q])
+                row[q] += s * (_ONE + t + t * t * _THIRD) * exp_minus(t)
+        else:
+            for q in range(m):
+                row[q] += s * exp_minus(work[q])
 
 
 @njit(cache=True, nogil=True, fastmath=True, inline="always")

@@ -60,11 +60,17 @@ class Field:
             around = neighbours(self.sites, cells)
             self.store.stale[around[around >= 0]] = True
 
-    def solve(self, cells: I32 | None = None) -> int:
-        """Bring cells, all of them by default, up to date, and return how many had to be solved."""
+    def solve(self, cells: I32 | None = None, tolerance: float = 0.0) -> int:
+        """Bring cells, all of them by default, up to date, and return how many had to be solved.
+
+        With a tolerance, cells stay as they are whose sites have drifted less than that on average, see `Sites`.
+        """
         sites, store = self.sites, self.store
         cells = np.arange(len(sites.cells), dtype=np.int32) if cells is None else cells
         todo = cells[store.stale[cells]]
+        if tolerance > 0:
+            moved = sites.drift[todo] > tolerance * sites.size[todo]
+            todo = todo[moved | ~store.is_solved(todo)]
         if not len(todo):
             return 0
         todo = todo[np.argsort(sites.cells.keys[todo])]
@@ -73,8 +79,7 @@ class Field:
         layout = lay_out(sites, involved[np.argsort(sites.cells.keys[involved])])
         place = np.full(len(sites.cells) + 1, -1, dtype=np.int32)  # the last: no cell
         place[layout.cells] = np.arange(len(involved))
-        depth = np.maximum(0, np.ceil(np.log2(np.maximum(sites.size[todo], 1) / self.model.leaf))).astype(np.int32)
-        leaves = 1 << depth.astype(np.int64)
+        leaves = np.maximum(1, -(-sites.size[todo] // self.model.leaf)).astype(np.int64)
         block_at = store.next_block + np.concatenate([[0], leaves.cumsum()])
         tree_at = np.concatenate([[0], (leaves - 1).cumsum()])
         axes, cuts = np.empty(tree_at[-1], dtype=np.int8), np.empty(tree_at[-1], dtype=np.float32)
@@ -82,16 +87,17 @@ class Field:
         def run(part: slice) -> Solved:
             return solve_cells(
                 layout, place[todo[part]].astype(np.int64), place[around[part]], CELL * sites.resolution,
-                self.model.sizes(), self._kernel, self._noise, depth[part], tree_at[part], axes, cuts,
+                self.model.sizes(), self._kernel, self._noise, leaves[part], tree_at[part], axes, cuts,
             )  # fmt: skip
 
         parts = _even_slices(leaves)
-        store.replace(todo, depth, block_at, parts, parallel_map(run, parts), axes, cuts)
+        sites.drift[todo] = 0
+        store.replace(todo, leaves, block_at, parts, parallel_map(run, parts), axes, cuts)
         return len(todo)
 
-    def query(self, points: F64, features: F32) -> Answers:
+    def query(self, points: F64, features: F32, tolerance: float = 0.0) -> Answers:
         """Answer at points (M, 3) with features (M, F), NaN where unknown; stale blocks are solved first."""
-        pairs = self.pairs(points, self.model.blend / 2)
+        pairs = self.pairs(points, self.model.blend / 2, tolerance=tolerance)
         M, C = len(points), self.sites.mass.shape[1]
         answers = Answers(np.zeros((M, C), np.float32), np.zeros((M, C), np.float32), np.zeros(M, np.float32))
 
@@ -111,7 +117,7 @@ class Field:
             parallel_map(run, self.store.jobs(pairs.block[order], order, _JOB))
         return answers
 
-    def pairs(self, points: F64, half: float, solve: bool = True) -> Pairs:
+    def pairs(self, points: F64, half: float, solve: bool = True, tolerance: float = 0.0) -> Pairs:
         """Return which blocks answer points (M, 3), with boxes of 2 * half voxels; solve stale ones, or not."""
         sites, parts = self.sites, list(slices(len(points), _QUERY_SLICE))
         assert sites.origin is not None, "a field without sites cannot be asked"
@@ -121,7 +127,7 @@ class Field:
             table = sites.cells.slots, sites.cells.keys, needed
             unknown = parallel_map(lambda s: mark_cells(points[s], sites.resolution, origin, half, *table), parts)
             empty = self._empty_cells(np.unique(np.concatenate([*unknown, np.empty(0, np.int64)])))
-            self.solve(np.concatenate([np.flatnonzero(needed).astype(np.int32), empty]))
+            self.solve(np.concatenate([np.flatnonzero(needed).astype(np.int32), empty]), tolerance)
         trees = self.store.trees(sites.cells)
         found_pairs = parallel_map(
             lambda s: find_pairs(points[s], s.start, sites.resolution, origin, half, trees), parts or [slice(0, 0)]

@@ -7,32 +7,52 @@ from numba import njit
 
 from semgp.blocks.arrays import F32
 
-_SPLIT = 48  # above this many rows, halves and matrix products are faster than plain loops
+_PANEL = 32  # rows that plain loops factor; everything else is matrix products
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True)
 def inverse_factor(A: F32, out: F32) -> None:
     """Fill `out` (n, n) with the inverse of the Cholesky factor of A (n, n); zeros above the diagonal.
 
-    A must be positive definite: the nugget sees to it.
+    Reads the lower triangle of A only, and overwrites it with the factor L. A must be positive definite, as the
+    nugget sees to. Panel by panel, with D = L_kk^-1: L_ik = A_ik D^T, A_ij -= L_ik L_jk^T below and to the right,
+    and row k of L^-1 is D [-L_k0 ... L_k,k-1, I] [L^-1 of the rows above].
     """
-    L = np.linalg.cholesky(A)
-    n = len(L)
+    n = len(A)
     out[:, :] = 0
-    if n <= _SPLIT:
-        _inverse(L, 0, n, out)
-        return
-    h = n // 2
-    _inverse(L, 0, h, out)
-    _inverse(L, h, n, out)
-    upper, lower = np.ascontiguousarray(out[:h, :h]), np.ascontiguousarray(out[h:n, h:n])
-    corner = np.ascontiguousarray(L[h:n, :h])
-    out[h:n, :h] = -np.dot(np.dot(lower, corner), upper)
+    for k in range(0, n, _PANEL):
+        e = min(k + _PANEL, n)
+        _factor(A, k, e)
+        _invert(A, k, e, out)
+        D = np.ascontiguousarray(out[k:e, k:e])
+        if k > 0:
+            left = np.dot(np.ascontiguousarray(A[k:e, :k]), np.ascontiguousarray(out[:k, :k]))
+            out[k:e, :k] = -np.dot(D, left)
+        if e < n:
+            panel = np.dot(np.ascontiguousarray(A[e:, k:e]), D.T)
+            A[e:, k:e] = panel
+            A[e:, e:] -= np.dot(panel, panel.T)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _inverse(L: F32, a: int, b: int, out: F32) -> None:
-    """Invert the triangle L[a:b, a:b] row by row into `out`."""
+def _factor(A: F32, a: int, b: int) -> None:
+    """Cholesky factor of A[a:b, a:b] in its place, row by row."""
+    for i in range(a, b):
+        row = A[i]
+        for j in range(a, i):
+            other, s = A[j], row[j]
+            for k in range(a, j):
+                s -= row[k] * other[k]
+            row[j] = s / other[j]
+        s = row[i]
+        for k in range(a, i):
+            s -= row[k] * row[k]
+        row[i] = np.sqrt(s)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def _invert(L: F32, a: int, b: int, out: F32) -> None:
+    """Invert the triangle L[a:b, a:b] row by row into the same place of `out`."""
     for i in range(a, b):
         row = out[i]
         for k in range(a, i):

@@ -73,7 +73,7 @@ def gather(
         _add_site(layout, s, 0, 0, 0, marks, mark, n, out)
         n += 1
     near_left, far_left = sizes.total - sizes.far - n, sizes.far
-    voxels, cells, order = _nearest(layout, around, low, high, edge, 2 * sizes.total)
+    voxels, cells, order = _nearest(layout, around, low, high, edge, sizes.total)
     for i in order:
         v, at = voxels[i], cells[i]
         dx, dy, dz = (at // 9 - 1) * edge, (at // 3 % 3 - 1) * edge, (at % 3 - 1) * edge
@@ -109,7 +109,7 @@ def _nearest(layout: Layout, around: I32, low: F32, high: F32, edge: float, want
             capacity += layout.n_coarse[around[at]]
     voxels, cells = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
     distance = np.empty((capacity, 1), np.float32)
-    reach = edge / 4
+    reach = edge / 8
     n = 0
     while True:
         n = 0

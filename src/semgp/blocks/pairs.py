@@ -33,12 +33,12 @@ class Pairs(NamedTuple):
 
 
 class CellTrees(NamedTuple):
-    """Cells by key; for each its first block (-1: none), depth and place of its tree; and all trees."""
+    """Cells by key; for each its first block (-1: none), leaves and place of its tree; and all trees."""
 
     slots: I64
     keys: I64
     block: I64
-    depth: I32
+    leaves: I64
     tree_at: I64
     axes: I8
     cuts: F32
@@ -138,7 +138,7 @@ def find_pairs(points: F64, first: int, resolution: float, origin: F64, half: fl
                     found = 1
                     if known:
                         found = overlapped(
-                            trees.axes, trees.cuts, trees.tree_at[cell], trees.depth[cell], box_low, box_high,
+                            trees.axes, trees.cuts, trees.tree_at[cell], trees.leaves[cell], box_low, box_high,
                             leaves, shares,
                         )  # fmt: skip
                     else:

@@ -45,6 +45,13 @@ class Sites:
         Inputs beyond the three coordinates.
     resolution : float
         Edge of a voxel in metres.
+
+    Attributes
+    ----------
+    drift : (cells,) array
+        How much each cell's sites have changed since someone set this to 0, summed over them: 1 for a new site;
+        for a label added to n, (1 - its class's share + 1/2) / (n + 1), half the L1 change of the shares and half
+        the growth of the mass.
     """
 
     def __init__(self, n_classes: int, n_features: int, resolution: float) -> None:
@@ -57,6 +64,7 @@ class Sites:
         self._cell = np.empty(0, dtype=np.int32)
         self._head = np.empty(0, dtype=np.int32)
         self._size = np.empty(0, dtype=np.int32)
+        self.drift = np.empty(0, dtype=np.float64)
 
     def __len__(self) -> int:
         return len(self.voxels)
@@ -123,6 +131,9 @@ class Sites:
             self.origin = voxel_origin(points, self.resolution) >> CELL_BITS << CELL_BITS
         if weights is not None and weights.max() > 1024:
             raise InputError("weights of soft labels must not be beyond 1024: divide them, or use probabilities.")
+        if weights is not None:
+            heavy = np.rint(weights * MASS_UNIT).sum(axis=1) > 0
+            points, weights, features = points[heavy], weights[heavy], features[heavy]
         known = len(self)
         rows = self.voxels.insert(voxel_keys(points, self.resolution, self.origin))
         self._grow()
@@ -130,9 +141,9 @@ class Sites:
         fraction = points / self.resolution
         fraction -= np.floor(fraction)
         if labels is not None:
-            _add_hard(rows, labels, fraction, features, self._mass, self._place)
+            _add_hard(rows, labels, fraction, features, self._cell, self._mass, self._place, self.drift)
         elif weights is not None:
-            _add_soft(rows, weights, fraction, features, self._mass, self._place)
+            _add_soft(rows, weights, fraction, features, self._cell, self._mass, self._place, self.drift)
         touched = np.zeros(len(self.cells), dtype=bool)
         touched[self._cell[rows]] = True
         return np.flatnonzero(touched).astype(np.int32)
@@ -142,6 +153,7 @@ class Sites:
         ids = self.cells.insert(keys).astype(np.int32)
         self._head = _extended(self._head, len(self.cells), -1)
         self._size = _extended(self._size, len(self.cells), 0)
+        self.drift = _extended(self.drift, len(self.cells), 0)
         return ids
 
     def _grow(self) -> None:
@@ -221,38 +233,37 @@ def _chain(
 
 @njit(cache=True, nogil=True)
 def _add_hard(
-    rows: I64,
-    labels: I32,
-    fraction: F64,
-    features: F32,
-    mass: U32,
-    place: I64,
+    rows: I64, labels: I32, fraction: F64, features: F32, cell: I32, mass: U32, place: I64, drift: F64
 ) -> None:
     for i in range(len(rows)):
-        mass[rows[i], labels[i]] += np.uint32(MASS_UNIT)
-        _add_place(rows[i], MASS_UNIT, fraction[i], features[i], place)
+        r, total = rows[i], np.int64(0)
+        for c in range(mass.shape[1]):
+            total += np.int64(mass[r, c])
+        drift[cell[r]] += (1.5 - mass[r, labels[i]] / total) * MASS_UNIT / (total + MASS_UNIT) if total else 1.0
+        mass[r, labels[i]] += np.uint32(MASS_UNIT)
+        _add_place(r, MASS_UNIT, fraction[i], features[i], place)
 
 
 @njit(cache=True, nogil=True)
 def _add_soft(
-    rows: I64,
-    weights: F32,
-    fraction: F64,
-    features: F32,
-    mass: U32,
-    place: I64,
+    rows: I64, weights: F32, fraction: F64, features: F32, cell: I32, mass: U32, place: I64, drift: F64
 ) -> None:
     for i in range(len(rows)):
-        total = 0
-        for c in range(weights.shape[1]):
-            w = int(np.rint(weights[i, c] * MASS_UNIT))
-            mass[rows[i], c] += np.uint32(w)
-            total += w
-        _add_place(rows[i], total, fraction[i], features[i], place)
+        r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
+        for c in range(mass.shape[1]):
+            w = np.int64(np.rint(weights[i, c] * MASS_UNIT))
+            total += np.int64(mass[r, c])
+            added += w
+            agreed += float(w) * float(mass[r, c])
+            mass[r, c] += np.uint32(w)
+        drift[cell[r]] += (
+            (1.5 - agreed / (float(total) * float(added))) * added / (total + added) if total else 1.0
+        )
+        _add_place(r, added, fraction[i], features[i], place)
 
 
 @njit(cache=True, nogil=True)
-def _add_place(row: int, w: int, fraction: F64, features: F32, place: I64) -> None:
+def _add_place(row: np.int64, w: int, fraction: F64, features: F32, place: I64) -> None:
     for d in range(3):
         place[row, d] += w * int(np.rint(fraction[d] * PLACE_UNIT))
     for f in range(len(features)):

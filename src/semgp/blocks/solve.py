@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F32, I8, I16, I32, I64
-from semgp.blocks.covariance import Mixture, covariance_tile
+from semgp.blocks.covariance import Mixture, covariance_lower
 from semgp.blocks.layout import Layout
 from semgp.blocks.linear import inverse_factor
 from semgp.blocks.members import Members, Sizes, gather
@@ -66,7 +66,7 @@ def solve_cells(
     sizes: Sizes,
     kernel: Mixture,
     noise: Noise,
-    depths: I32,
+    leaves: I64,
     tree_at: I64,
     axes: I8,
     cuts: F32,
@@ -85,15 +85,13 @@ def solve_cells(
         Edge of a cell in metres.
     sizes, kernel, noise
         The model.
-    depths, tree_at : (n,) arrays
-        Depth of each cell's tree, and where it begins in `axes` and `cuts`.
+    leaves, tree_at : (n,) arrays
+        Leaves of each cell's tree, and where it begins in `axes` and `cuts`.
     axes, cuts : arrays
         The trees' planes, filled in.
     """
     T, D, C = sizes.total, layout.X.shape[1], layout.mass.shape[1]
-    B = 0
-    for depth in depths:
-        B += 1 << depth
+    B = leaves.sum()
     solved = Solved(
         np.zeros(B, np.int32),
         np.empty((B, D, T), np.float32),
@@ -111,12 +109,12 @@ def solve_cells(
     K, work = np.empty(T * T, np.float32), np.empty(T, np.float32)
     b = -1
     for i in range(len(places)):
-        cell, depth = places[i], depths[i]
+        cell, n_leaves = places[i], leaves[i]
         a, n_sites = layout.start[cell], layout.start[cell + 1] - layout.start[cell]
-        order, bounds = np.empty(n_sites, np.int64), np.empty((1 << depth) + 1, np.int64)
-        t, size = tree_at[i], (1 << depth) - 1
-        split(layout.X[a : a + n_sites], order, depth, axes[t : t + size], cuts[t : t + size], bounds)
-        for leaf in range(1 << depth):
+        order, bounds = np.empty(n_sites, np.int64), np.empty(n_leaves + 1, np.int64)
+        t, size = tree_at[i], n_leaves - 1
+        split(layout.X[a : a + n_sites], order, n_leaves, axes[t : t + size], cuts[t : t + size], bounds)
+        for leaf in range(n_leaves):
             b += 1
             own = order[bounds[leaf] : bounds[leaf + 1]] + a
             n = gather(layout, around[i], own, edge, sizes, marks, b, members)
@@ -200,7 +198,7 @@ def solve_block(
     P = len(present)
     _targets(rows, n, present, noise)
     A = K_flat[: n * n].reshape(n, n)
-    covariance_tile(X, n, X, n, kernel, A, work)
+    covariance_lower(X, n, kernel, A, work)
     for j in range(n):
         A[j, j] += np.float32(noise.s_n) / rows[2 + 2 * P, j] + np.float32(noise.nugget) / k[j]
     inverse_factor(A, factor)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from semgp.blocks.arrays import F32, I8, I32, I64
+from semgp.blocks.arrays import F32, I8, I32, I64, Bool
 from semgp.blocks.experts import BlockExpert
 from semgp.blocks.pairs import CellTrees
 from semgp.blocks.solve import Solved
@@ -47,7 +47,7 @@ class BlockStore:
         self.pieces: dict[int, Piece] = {}
         self.next_block = 0
         self._block, self._tree_at = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-        self._depth, self._piece = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64)
+        self._leaves, self._piece = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         self._axes, self._cuts = np.empty(0, dtype=np.int8), np.empty(0, dtype=np.float32)
 
     def grow(self, n_cells: int, stale: bool) -> None:
@@ -58,12 +58,12 @@ class BlockStore:
             self._block = np.append(self._block, np.full(new, -1))
             self._piece = np.append(self._piece, np.full(new, -1))
             self._tree_at = np.append(self._tree_at, np.zeros(new, dtype=np.int64))
-            self._depth = np.append(self._depth, np.zeros(new, dtype=np.int32))
+            self._leaves = np.append(self._leaves, np.zeros(new, dtype=np.int64))
 
     def replace(
         self,
         cells: I32,
-        depth: I32,
+        leaves: I64,
         block_at: I64,
         parts: Sequence[slice],
         solved: Sequence[Solved],
@@ -78,16 +78,19 @@ class BlockStore:
             self.pieces[first] = Piece(first, piece, part.stop - part.start)
             self._piece[cells[part]] = first
         self._compact_trees(cells)
-        sizes = (1 << depth.astype(np.int64)) - 1
-        self._tree_at[cells] = len(self._axes) + np.concatenate([[0], sizes.cumsum()[:-1]])
+        self._tree_at[cells] = len(self._axes) + np.concatenate([[0], (leaves - 1).cumsum()[:-1]])
         self._axes, self._cuts = np.concatenate([self._axes, axes]), np.concatenate([self._cuts, cuts])
-        self._block[cells], self._depth[cells] = block_at[:-1], depth
+        self._block[cells], self._leaves[cells] = block_at[:-1], leaves
         self.next_block = int(block_at[-1])
         self.stale[cells] = False
 
+    def is_solved(self, cells: I32) -> Bool:
+        """Return which cells have blocks, up to date or not."""
+        return np.asarray(self._block[cells] >= 0)
+
     def trees(self, cells: VoxelTable) -> CellTrees:
         """Return what compiled code needs to find the blocks of points."""
-        return CellTrees(cells.slots, cells.keys, self._block, self._depth, self._tree_at, self._axes, self._cuts)
+        return CellTrees(cells.slots, cells.keys, self._block, self._leaves, self._tree_at, self._axes, self._cuts)
 
     def jobs(self, block: I64, order: I64, size: int) -> Iterator[tuple[Piece | None, I64]]:
         """Split pairs, of ascending blocks (n,), by piece (None: no block) and to at most `size` of them."""
@@ -106,7 +109,7 @@ class BlockStore:
     @property
     def n_blocks(self) -> int:
         """Number of blocks that are in use."""
-        return int((1 << self._depth[self._block >= 0].astype(np.int64)).sum())
+        return int(self._leaves[self._block >= 0].sum())
 
     @property
     def n_bytes(self) -> int:
@@ -125,7 +128,7 @@ class BlockStore:
         keep = self._block >= 0
         keep[dropped] = False
         cells = np.flatnonzero(keep)
-        sizes = (1 << self._depth[cells].astype(np.int64)) - 1
+        sizes = self._leaves[cells] - 1
         total = int(sizes.sum())
         if 2 * total >= len(self._axes):
             return

@@ -1,7 +1,8 @@
 """Balanced k-d trees of a cell's sites, and the leaves that a small box overlaps.
 
-A tree of 2^depth leaves lies in two flat arrays, level by level, as a heap: node i has the children 2 i + 1 and
-2 i + 2. Trees depend on the sites alone, not on the order in which they came.
+The node of the leaves [a, b) has the children [a, h) and [h, b), h = (a + b) // 2; its plane lies in place h - 1
+of two flat arrays, so a tree of L leaves takes L - 1 places. Sites are shared out in proportion to the leaves.
+Trees depend on the sites alone, not on the order in which they came.
 """
 
 from __future__ import annotations
@@ -15,29 +16,36 @@ Int = I64
 
 
 @njit(cache=True, nogil=True)
-def split(X: F32, order: Int, depth: int, axes: I8, cuts: F32, bounds: Int) -> None:
-    """Sort the sites X (n, D) into the leaves of a tree: halves along the widest of the three coordinates.
+def split(X: F32, order: I64, n_leaves: int, axes: I8, cuts: F32, bounds: I64) -> None:
+    """Sort the sites X (n, D) into the leaves of a tree: parts along the widest of the three coordinates.
 
-    Fills in `order` (n,), the sites leaf by leaf; `bounds` (2^depth + 1,), where each leaf begins in it; and
-    `axes` and `cuts` (2^depth - 1,), the planes.
+    Fills in `order` (n,), the sites leaf by leaf; `bounds` (n_leaves + 1,), where each leaf begins in it; and
+    `axes` and `cuts` (n_leaves - 1,), the planes.
     """
     n = len(order)
     for i in range(n):
         order[i] = i
-    bounds[0], bounds[1] = 0, n
-    for level in range(depth):
-        for k in range((1 << level) - 1, -1, -1):
-            a, b = bounds[k], bounds[k + 1]
-            middle = (a + b) // 2
-            axis = _widest(X, order, a, b)
-            _select(X, order, a, b, middle, axis)
-            node = (1 << level) - 1 + k
-            below = X[order[a], axis]
-            for i in range(a, middle):
-                below = max(below, X[order[i], axis])
-            axes[node], cuts[node] = axis, (below + X[order[middle], axis]) / 2
-            bounds[2 * k + 2], bounds[2 * k + 1] = b, middle
-            bounds[2 * k] = a
+    bounds[0], bounds[n_leaves] = 0, n
+    firsts, lasts = np.empty(n_leaves, np.int64), np.empty(n_leaves, np.int64)
+    firsts[0], lasts[0], waiting = 0, n_leaves, 1
+    while waiting:
+        waiting -= 1
+        first, last = firsts[waiting], lasts[waiting]
+        if last - first == 1:
+            continue
+        half = (first + last) // 2
+        a, b = bounds[first], bounds[last]
+        middle = a + (b - a) * (half - first) // (last - first)
+        axis = _widest(X, order, a, b)
+        _select(X, order, a, b, middle, axis)
+        below = X[order[a], axis]
+        for i in range(a, middle):
+            below = max(below, X[order[i], axis])
+        axes[half - 1], cuts[half - 1] = axis, (below + X[order[middle], axis]) / 2
+        bounds[half] = middle
+        firsts[waiting], lasts[waiting] = first, half
+        firsts[waiting + 1], lasts[waiting + 1] = half, last
+        waiting += 2
 
 
 @njit(cache=True, nogil=True)
@@ -79,35 +87,43 @@ def _select(X: F32, order: Int, a: int, b: int, k: int, axis: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def overlapped(axes: I8, cuts: F32, start: int, depth: int, low: F32, high: F32, leaves: Int, shares: F32) -> int:
+def overlapped(
+    axes: I8, cuts: F32, start: int, n_leaves: int, low: F32, high: F32, leaves: I64, shares: F32
+) -> int:
     """Find the leaves of the tree at `start` that a box overlaps, with the share of the box in each.
 
     Returns the number of leaves; fills in `leaves` and `shares`. The shares add up to one.
     """
     n = 1
-    leaves[0], shares[0] = 0, 1
+    ends = np.empty(len(leaves), np.int64)
     lows, highs = np.empty((len(leaves), 3), np.float32), np.empty((len(leaves), 3), np.float32)
+    leaves[0], ends[0], shares[0] = 0, n_leaves, 1
     for d in range(3):
         lows[0, d], highs[0, d] = low[d], high[d]
-    for level in range(depth):
-        for i in range(n):
-            node = start + (1 << level) - 1 + leaves[i]
-            axis, cut = axes[node], cuts[node]
-            leaves[i] *= 2
-            if highs[i, axis] <= cut:
-                continue
-            if lows[i, axis] >= cut:
-                leaves[i] += 1
-                continue
-            if n == len(leaves):  # more leaves than any box of a voxel's size meets: stay on the larger side
-                if highs[i, axis] - cut > cut - lows[i, axis]:
-                    leaves[i] += 1
-                continue
+    i = 0
+    while i < n:
+        first, last = leaves[i], ends[i]
+        if last - first == 1:
+            i += 1
+            continue
+        half = (first + last) // 2
+        axis, cut = axes[start + half - 1], cuts[start + half - 1]
+        if highs[i, axis] <= cut:
+            ends[i] = half
+        elif lows[i, axis] >= cut:
+            leaves[i] = half
+        elif n == len(leaves):  # more leaves than a box of a voxel's size meets: stay on the larger side
+            if highs[i, axis] - cut > cut - lows[i, axis]:
+                leaves[i] = half
+            else:
+                ends[i] = half
+        else:
             part = (cut - lows[i, axis]) / (highs[i, axis] - lows[i, axis])
-            leaves[n], shares[n] = leaves[i] + 1, shares[i] * (1 - part)
+            leaves[n], ends[n], shares[n] = half, last, shares[i] * (1 - part)
             for d in range(3):
                 lows[n, d], highs[n, d] = lows[i, d], highs[i, d]
             lows[n, axis] = highs[i, axis] = cut
+            ends[i] = half
             shares[i] *= part
             n += 1
     return n

@@ -40,6 +40,7 @@ class ManyBlocks:
 
     def __init__(self, classes: Classes, model: BlockModel) -> None:
         self.classes, self.model = classes, model
+        self.tolerance = 0.0
         self._field = Field(model, len(classes))
 
     def add(self, part: LabelledCloud) -> None:
@@ -66,15 +67,15 @@ class ManyBlocks:
             features = np.full((len(X), F), np.nan, dtype=np.float32)
         if features.shape != (len(X), F):
             raise InputError(f"features must have shape ({len(X)}, {F}) for this model, not {features.shape}.")
-        answers = self._field.query(X, features)
+        answers = self._field.query(X, features, self.tolerance)
         # one covariance for all classes has one variance for all of them
         variance = np.broadcast_to(answers.variance[:, None], answers.probability.shape)
         observed = answers.variance < UNEXPLAINED * self._field.prior_variance
         return Prediction(self.classes, answers.probability, observed, answers.mean, variance)
 
     def solve(self) -> None:
-        """Solve all blocks that are not up to date."""
-        self._field.solve()
+        """Solve the blocks that are not up to date, but for the tolerance."""
+        self._field.solve(tolerance=self.tolerance)
 
     def crop(self, keep: Callable[[NDArray[np.float64]], NDArray[np.bool_]]) -> ManyBlocks:
         """Return the same of the sites that `keep` selects."""
