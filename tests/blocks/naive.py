@@ -85,7 +85,7 @@ def blended(field: Field, pairs: Pairs, n_points: int, features: NDArray[np.floa
     """The answers of all pairs, each by `answer` from the members that its block has, added up."""
     C = field.sites.mass.shape[1]
     total = Belief(np.zeros((n_points, C)), np.zeros((n_points, C)), np.zeros(n_points))
-    prior = field.model.class_prior(C)
+    prior = field.model.class_prior(C).astype(np.float64)
     for point, number, w, local in zip(pairs.point, pairs.block, pairs.weight, pairs.local):
         one = Belief(prior[None], prior[None], np.array([field.prior_variance]))
         if number >= 0:

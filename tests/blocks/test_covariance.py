@@ -9,6 +9,7 @@ from semgp.blocks.objective import _of_theta
 from semgp.errors import InputError
 from semgp.gp.kernels import Kernel, Product
 from semgp.gp.stationary import Matern12, Matern32, Matern52, SquaredExponential
+from tests.blocks.naive import Array
 
 KINDS = (Matern12, Matern32, Matern52, SquaredExponential)
 KERNELS: list[Kernel] = [
@@ -23,7 +24,7 @@ D = 5
 
 
 @pytest.fixture
-def inputs() -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def inputs() -> tuple[Array, Array]:
     rng = np.random.default_rng(0)
     X, Z = rng.normal(size=(40, D)), rng.normal(size=(13, D))
     Z[4] = X[7]  # at no distance, square roots have no derivative
@@ -32,7 +33,7 @@ def inputs() -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
 
 
 @pytest.mark.parametrize("kernel", KERNELS, ids=str)
-def test_covariances(kernel: Kernel, inputs: tuple) -> None:  # type: ignore[type-arg]
+def test_covariances(kernel: Kernel, inputs: tuple[Array, Array]) -> None:
     X, Z = inputs
     n, m = len(Z), len(X)
     wide_Z, wide_X = np.full((D, n + 3), np.nan, np.float32), np.full((D, m + 2), np.nan, np.float32)
@@ -43,7 +44,7 @@ def test_covariances(kernel: Kernel, inputs: tuple) -> None:  # type: ignore[typ
 
 
 @pytest.mark.parametrize("kernel", KERNELS, ids=str)
-def test_derivatives(kernel: Kernel, inputs: tuple) -> None:  # type: ignore[type-arg]
+def test_derivatives(kernel: Kernel, inputs: tuple[Array, Array]) -> None:
     X, Z = inputs
     H = np.random.default_rng(1).normal(size=(len(Z), len(X))).astype(np.float32)
     packed = mixture(kernel, D)
@@ -71,5 +72,5 @@ def test_terms_stand_in_the_order_of_the_parameters() -> None:
     ids=str,
 )
 def test_kernels_that_blocks_do_not_take(kernel: Kernel) -> None:
-    with pytest.raises(InputError, match="stationary kernels|do not fit"):
+    with pytest.raises(InputError, match=r"stationary kernels|do not fit"):
         mixture(kernel, D)

@@ -13,13 +13,13 @@ from semgp.gp.stationary import Matern52
 def test_exponential_over_its_range() -> None:
     t = np.concatenate([np.linspace(0, 100, 20_000), np.geomspace(1e-30, 1, 2_000)]).astype(np.float32)
     found = np.array([exp_minus(v) for v in t], dtype=np.float64)
-    np.testing.assert_allclose(found, np.exp(-t.astype(np.float64)), atol=1e-7)
+    np.testing.assert_allclose(found, np.exp(-t.astype(np.float64)), rtol=0, atol=2e-7)
     small = t < 80  # a member far away still counts for what it is worth, relative to others as far
     np.testing.assert_allclose(found[small], np.exp(-t[small].astype(np.float64)), rtol=2e-5)
 
 
 def test_exponential_at_the_ends() -> None:
-    assert exp_minus(np.float32(0)) == pytest.approx(1, abs=1e-7)
+    assert exp_minus(np.float32(0)) == pytest.approx(1, abs=2e-7)
     assert 0 <= exp_minus(np.float32(1e30)) < 2e-38
 
 
@@ -40,11 +40,10 @@ def test_logarithm_of_next_to_nothing_is_that_of_the_smallest_number(x: float) -
     assert log(np.float32(x)) == pytest.approx(np.log(1.2e-38), rel=1e-6)
 
 
-@given(st.floats(1e-37, 1e30, width=32))
+@given(st.floats(0, 60, width=32))
 @settings(deadline=None, max_examples=200)
-def test_each_undoes_the_other(x: float) -> None:
-    if x <= 1:
-        assert exp_minus(-log(np.float32(x))) == pytest.approx(x, rel=2e-5)
+def test_each_undoes_the_other(t: float) -> None:
+    assert -log(exp_minus(np.float32(t))) == pytest.approx(t, rel=1e-5, abs=1e-6)
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 48, 49, 64, 96, 129])

@@ -21,7 +21,7 @@ def scan(corner: LabelledCloud, tmp_path: Path) -> Path:
 @pytest.fixture
 def built(scan: Path) -> Path:
     out = scan.with_name("map.semgp")
-    run("build", scan, "--out", out, "--iterations", "2", "--inducing", "30", "--quiet")
+    run("build", scan, "--out", out, "--quiet")
     return out
 
 

@@ -9,7 +9,7 @@ from numba import njit
 
 from semgp.blocks.arrays import F32, I16, I64
 from semgp.blocks.covariance import Mixture, covariance_tile
-from semgp.blocks.link import Link, class_probabilities
+from semgp.blocks.link import Link, class_probabilities, error_shares
 from semgp.blocks.pairs import Pairs
 from semgp.blocks.solve import SHARED, Solved
 
@@ -62,6 +62,7 @@ def answer_pairs(
     X, work, variance = np.empty((D, TILE), np.float32), np.empty(T, np.float32), np.empty(TILE, np.float32)
     K_flat, V_flat = np.empty(T * TILE, np.float32), np.empty(T * TILE, np.float32)
     F_flat, p_flat = np.empty(most * TILE, np.float32), np.empty(most * TILE, np.float32)
+    u = np.zeros(TILE, np.float32)
     prior_variance = np.float32(0)
     for k in range(len(kernel.variance)):
         prior_variance += kernel.variance[k]
@@ -93,17 +94,21 @@ def answer_pairs(
             _explained_by_vote(F[2 + 2 * P], prior_variance, link.v_0, variance, m)
         p = p_flat[: (P + 1) * m].reshape(P + 1, m)
         class_probabilities(F, solved.present[b, :P], m, link, p)
-        _add(pairs, order, begin, m, solved.present[b, :P], p, F, variance, link, answers)
+        if link.other or link.error_rate > 0:
+            error_shares(p, solved.present[b, :P], m, link, u)
+        _add(pairs, order, begin, m, solved.present[b, :P], p, u, F, variance, link, answers)
         begin = end
 
 
 @njit(cache=True, nogil=True)
 def answer_prior(pairs: Pairs, order: I64, prior_variance: float, link: Link, answers: Answers) -> None:
     """Add the prior for pairs without a block."""
+    C = answers.probability.shape[1]
+    known = link.prior[:C] / link.prior[:C].sum()
     for i in order:
         point, w = pairs.point[i], pairs.weight[i]
-        for c in range(len(link.prior)):
-            answers.probability[point, c] += w * link.prior[c]
+        for c in range(answers.probability.shape[1]):
+            answers.probability[point, c] += w * known[c]
             answers.mean[point, c] += w * link.prior[c]
         answers.variance[point] += w * np.float32(prior_variance)
 
@@ -145,6 +150,7 @@ def _add(
     m: int,
     present: I16,
     p: F32,
+    u: F32,
     F: F32,
     variance: F32,
     link: Link,
@@ -158,11 +164,11 @@ def _add(
         out, mean = answers.probability[point], answers.mean[point]
         absent, left = w * p[P, q], w * (1 - F[0, q])
         k = 0
-        for c in range(len(link.prior)):
+        for c in range(len(out)):
             if k < P and present[k] == c:
-                out[c] += w * p[k, q]
+                out[c] += w * (p[k, q] + u[q] * link.errors[c])
                 mean[c] += w * (F[2 + k, q] + link.prior[c])
                 k += 1
             else:
-                out[c] += absent * link.power[c]
+                out[c] += absent * link.power[c] + w * u[q] * link.errors[c]
                 mean[c] += left * link.prior[c]

@@ -36,7 +36,8 @@ class Field:
     def __init__(self, model: BlockModel, n_classes: int) -> None:
         model.fits(n_classes)
         self.model = model
-        self.sites = Sites(n_classes, len(model.features), model.resolution)
+        self.sites = Sites(n_classes + model.other, len(model.features), model.resolution)
+        self._n_classes = n_classes
         self.store = BlockStore()
         self._kernel = mixture(model.kernel, model.n_dims)
         self._noise, self._link = model.noise(n_classes), model.link(n_classes)
@@ -98,7 +99,7 @@ class Field:
     def query(self, points: F64, features: F32, tolerance: float = 0.0) -> Answers:
         """Answer at points (M, 3) with features (M, F), NaN where unknown; stale blocks are solved first."""
         pairs = self.pairs(points, self.model.blend / 2, tolerance=tolerance)
-        M, C = len(points), self.sites.mass.shape[1]
+        M, C = len(points), self._n_classes
         answers = Answers(np.zeros((M, C), np.float32), np.zeros((M, C), np.float32), np.zeros(M, np.float32))
 
         def run(job: tuple[Piece | None, I64]) -> None:

@@ -22,7 +22,7 @@ class Gradient(NamedTuple):
     """Sums over patches of the loss and its derivatives.
 
     loss (1,). kernel (Q, D + 1): in the logarithms of length scales and sf. noise (3,): in s_n, nugget and a. link
-    (5,): in delta, v_0 and the three weights.
+    (6,): sums over patches of the derivatives in delta, v_0, the three weights and the error rate.
     """
 
     loss: F64
@@ -79,22 +79,22 @@ def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, li
 @njit(cache=True, nogil=True)
 def _link_gradient(F: F32, prob: F32, present: I16, label: I32, link: Link, G: F32, g: F64) -> float:
     """Return the mean log-loss; fill in G = dL/dF and add the derivatives in the link's parameters to g."""
-    P, m = len(present), len(label)
-    prior, power, delta, v_0, w_i, w_l, w_v = link
-    place = np.full(len(prior), -1, np.int64)
+    P, m, C = len(present), len(label), len(link.prior)
+    prior, delta, v_0 = link.prior, link.delta, link.v_0
+    w_i, w_l, w_v = link.indicator, link.log_ratio, link.vote
+    place = np.full(C, -1, np.int64)
     for p in range(P):
         place[present[p]] = p
     G[:, :] = 0
-    loss = 0.0
+    loss, score, slope = 0.0, np.empty(C), np.empty(C)
     for q in range(m):
-        y = label[q]
-        at = place[y]
-        loss -= np.log(max(prob[at, q] if at >= 0 else prob[P, q] * power[y], np.float32(1e-12)))
-        for c in range(len(prior)):
+        for c in range(C):
+            score[c] = prob[place[c], q] if place[c] >= 0 else prob[P, q] * link.power[c]
+        loss += _score_slope(score, label[q], link, 1 / m, slope, g)
+        for c in range(C):
             i = place[c] if place[c] >= 0 else P
             pi = prior[c] if i < P else np.float32(1)
-            chance = prob[i, q] if i < P else prob[P, q] * power[c]
-            d = (chance - (1.0 if c == y else 0.0)) / m
+            d = slope[c] / m
             if w_i > 0:
                 latent = F[2 + i, q] + pi if i < P else np.float32(1) - F[0, q]
                 inside = max(latent, np.float32(0)) + delta * pi
@@ -114,6 +114,42 @@ def _link_gradient(F: F32, prob: F32, present: I16, label: I32, link: Link, G: F
                 g[1] += d * w_v * pi / inside
                 g[4] += d * (np.log(inside) + (0.0 if i < P else np.log(prior[c])))
     return loss / m
+
+
+@njit(cache=True, nogil=True)
+def _score_slope(score: F64, y: int, link: Link, share: float, slope: F64, g: F64) -> float:
+    """Return -log p_y and fill in its derivatives in the logarithms of the pool's scores (C,), which sum to one.
+
+    Adds `share` of that in the error rate to g.
+    """
+    C = len(score)
+    classes = C - 1 if link.other else C
+    rest = max(1 - score[C - 1], 1e-6) if link.other else 1.0
+    top = 0
+    for c in range(classes):
+        top = c if score[c] > score[top] else top
+    s_top, s_y = min(score[top] / rest, 1.0), score[y] / rest
+    unsure = max(1 - s_top, 1e-6)
+    u = 0.0
+    if link.error_rate > 0:
+        odds = unsure / s_top * (max(score[C - 1], 1e-6) if link.other else 1.0)
+        w = link.error_rate * odds**link.error_power
+        u = w / (1 + w)
+    p_y = max((1 - u) * s_y + u * link.errors[y], 1e-12)
+    # of log p_y in s_y, and in log w
+    through_s, through_w = (1 - u) * s_y / p_y, u * (1 - u) * (link.errors[y] - s_y) / p_y
+    for c in range(C):
+        d = 0.0
+        if c < classes:
+            s = score[c] / rest
+            d = through_s * ((1.0 if c == y else 0.0) - s)
+            d += through_w * link.error_power * (-1.0 if c == top else s / unsure)
+        if link.other:
+            d += through_w * link.error_power * ((1.0 if c == C - 1 else 0.0) - score[c])
+        slope[c] = -d
+    if link.error_rate > 0:
+        g[5] -= share * through_w / link.error_rate
+    return float(-np.log(p_y))
 
 
 @njit(cache=True, nogil=True)

@@ -17,6 +17,7 @@ from semgp.blocks.arrays import F64
 from semgp.blocks.draw import Trial, draw_patches
 from semgp.blocks.model import BlockModel
 from semgp.blocks.objective import Objective, Progress, all_free, temperature_free
+from semgp.blocks.patches import Patch
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 
@@ -140,6 +141,22 @@ def class_frequencies(clouds: Sequence[LabelledCloud]) -> tuple[float, ...]:
     return tuple(np.asarray(mass / mass.sum()).tolist())
 
 
+def error_frequencies(patches: Sequence[Patch], n_classes: int) -> tuple[float, ...]:
+    """Return how the judges' labels fall on the classes where the nearest member's first class is another.
+
+    Half-way to even, for classes that never come up among few errors.
+    """
+    wrong = np.zeros(n_classes)
+    for p in patches:
+        nearest = ((p.Y[:3, :, None] - p.X[:3, None, :]) ** 2).sum(axis=0).argmin(axis=1)
+        named = p.present < n_classes
+        if named.any():
+            first = p.present[named][p.mass[named].argmax(axis=0)[nearest]]
+            wrong += np.bincount(p.label[first != p.label], minlength=n_classes) / len(p.label)
+    share = wrong / wrong.sum() if wrong.any() else np.full(n_classes, 1 / n_classes)
+    return tuple(((share + 1 / n_classes) / 2).tolist())
+
+
 @dataclass(frozen=True)
 class _Search:
     """How to search: patches drawn, seed, progress."""
@@ -161,10 +178,15 @@ class _Search:
             raise InputError(
                 "no labelled point of the judges lies near the others' labels: nothing to learn from."
             )
+        if start.error_rate > 0 and start.errors is None:
+            start = replace(start, errors=error_frequencies(drawn, len(start.prior or ())))
         objective = Objective(start, drawn, free, spread, self.progress)
         x = np.zeros(free.shape[1])
         before, _ = objective(x)
-        found = minimize(objective, x, jac=True, method="L-BFGS-B", options={"maxiter": max_iterations})
+        far = [(-6 * spread, 6 * spread)] * len(x)  # where the first long step cannot underflow
+        found = minimize(
+            objective, x, jac=True, method="L-BFGS-B", bounds=far, options={"maxiter": max_iterations}
+        )
         after = float(found.fun) - objective.penalty(found.x)
         return objective.model(found.x), LearnedBlocks(after, before, len(drawn), int(found.nit))
 

@@ -62,6 +62,12 @@ class BlockModel:
     prior : tuple of float, optional
         Class frequencies, one a class; left out, all alike. Part of the model, so that data in one place do not
         change the map in another.
+    other : bool, optional
+        For soft labels, class probabilities: what a row lacks to one is the mass of no class of the map, and kept.
+    error_rate, error_power : float, optional
+        b and k of the share of errors, see `semgp.blocks.link`; a rate of 0 for none.
+    errors : tuple of float, optional
+        How errors fall on the classes, r; left out, evenly.
     features : tuple of str, optional
         Inputs beyond position: names of a cloud's features, or "red", "green", "blue" (0 to 1).
     leaf, near, far : int, optional
@@ -86,11 +92,15 @@ class BlockModel:
     delta: float = 0.005
     v_0: float = 0.05
     prior: tuple[float, ...] | None = None
+    other: bool = False
+    error_rate: float = 0.0
+    error_power: float = 0.4
+    errors: tuple[float, ...] | None = None
     features: tuple[str, ...] = ()
-    leaf: int = 48
-    near: int = 16
-    far: int = 32
-    blend: float = 1.0
+    leaf: int = 64
+    near: int = 8
+    far: int = 24
+    blend: float = 1.25
 
     def __post_init__(self) -> None:
         if self.posterior not in (*CLOSED, *EXPERTS):
@@ -100,16 +110,22 @@ class BlockModel:
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"{name} must be positive and finite, not {value}.")
             object.__setattr__(self, name, float(value))
-        given = CLOSED.get(self.posterior, (0.0, 0.0, 1.0)) if self.weights is None else self.weights
-        powers = tuple(float(w) for w in given)
+        weights = CLOSED.get(self.posterior, (0.0, 0.0, 1.0)) if self.weights is None else self.weights
+        powers = tuple(float(w) for w in weights)
         if len(powers) != 3 or not all(math.isfinite(w) and w >= 0 for w in powers) or sum(powers) <= 0:
-            raise InputError(f"weights must be three numbers, none negative, not all zero, not {given}.")
+            raise InputError(f"weights must be three numbers, none negative, not all zero, not {weights}.")
         object.__setattr__(self, "weights", powers)
-        if self.prior is not None:
-            prior = tuple(float(p) for p in self.prior)
-            if not prior or not all(math.isfinite(p) and p > 0 for p in prior):
-                raise InputError("the prior must have a positive frequency for each class.")
-            object.__setattr__(self, "prior", prior)
+        for name in ("prior", "errors"):
+            given = getattr(self, name)
+            if given is not None:
+                frequencies = tuple(float(p) for p in given)
+                if not frequencies or not all(math.isfinite(p) and p > 0 for p in frequencies):
+                    raise InputError(f"{name} must have a positive frequency for each class.")
+                object.__setattr__(self, name, frequencies)
+        if not (0 <= self.error_rate < math.inf and 0 < self.error_power < math.inf):
+            raise InputError("error_rate must be 0 or above, error_power above 0, both finite.")
+        if self.posterior in EXPERTS and (self.other or self.error_rate > 0):
+            raise InputError(f"a {self.posterior} model knows no other mass and no error rate.")
         object.__setattr__(self, "features", tuple(self.features))
         if self.leaf < 2 or self.near < 0 or self.far < 0 or self.members > _MOST_MEMBERS:
             raise InputError(f"a block needs 2 own sites at least and {_MOST_MEMBERS} members at most.")
@@ -146,14 +162,19 @@ class BlockModel:
         return self.posterior in CLOSED and (self.powers[0] > 0 or self.powers[1] > 0)
 
     def fits(self, n_classes: int) -> None:
-        """Raise InputError where the prior is for another number of classes."""
-        if self.prior is not None and len(self.prior) != n_classes:
-            raise InputError(f"the model's prior is for {len(self.prior)} classes, the map has {n_classes}.")
+        """Raise InputError where prior or errors are for another number of classes."""
+        for name in ("prior", "errors"):
+            given = getattr(self, name)
+            if given is not None and len(given) != n_classes:
+                raise InputError(f"the model's {name} is for {len(given)} classes, the map has {n_classes}.")
 
     def class_prior(self, n_classes: int) -> F32:
-        """Return the prior probabilities (C,)."""
+        """Return the prior probabilities (C,), or (C + 1,) with that of the mass of no class, an even share."""
         prior = np.ones(n_classes) if self.prior is None else np.asarray(self.prior)
-        return np.asarray(prior / prior.sum(), dtype=np.float32)
+        prior = prior / prior.sum()
+        if self.other:
+            prior = np.append(prior * n_classes, 1.0) / (n_classes + 1)
+        return np.asarray(prior, dtype=np.float32)
 
     def sizes(self) -> Sizes:
         """Return the block sizes for compiled code."""
@@ -167,14 +188,18 @@ class BlockModel:
         """Return the link for compiled code."""
         prior = self.class_prior(n_classes)
         w_i, w_l, w_v = (np.float32(w) for w in self.powers)
-        return Link(prior, prior ** (w_i + w_l + w_v), np.float32(self.delta), np.float32(self.v_0), w_i, w_l, w_v)
+        errors = np.ones(n_classes) if self.errors is None else np.asarray(self.errors)
+        return Link(
+            prior, prior ** (w_i + w_l + w_v), np.float32(self.delta), np.float32(self.v_0), w_i, w_l, w_v,
+            self.other, np.asarray(errors / errors.sum(), dtype=np.float32), self.error_rate, self.error_power,
+        )  # fmt: skip
 
     def to_json(self) -> dict[str, Any]:
         """Return the model as a dictionary ready for JSON."""
         plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
         lists = {name: list(plain[name]) for name in ("weights", "features")}
-        prior = None if self.prior is None else list(self.prior)
-        return plain | lists | {"prior": prior, "kernel": kernel_to_json(self.kernel)}
+        maybe = {n: None if plain[n] is None else list(plain[n]) for n in ("prior", "errors")}
+        return plain | lists | maybe | {"kernel": kernel_to_json(self.kernel)}
 
     @classmethod
     def from_json(cls, plain: Mapping[str, Any]) -> BlockModel:
@@ -186,8 +211,8 @@ class BlockModel:
             Fields that are missing, unknown or of the wrong kind.
         """
         try:
-            prior = None if plain["prior"] is None else tuple(plain["prior"])
-            lists = {"weights": tuple(plain["weights"]), "features": tuple(plain["features"]), "prior": prior}
-            return cls(**{**plain, **lists, "kernel": kernel_from_json(plain["kernel"])})
+            lists = {n: tuple(plain[n]) for n in ("weights", "features")}
+            maybe = {n: None if plain[n] is None else tuple(plain[n]) for n in ("prior", "errors")}
+            return cls(**{**plain, **lists, **maybe, "kernel": kernel_from_json(plain["kernel"])})
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"this is no block model: {error}") from error

@@ -1,7 +1,7 @@
 """What learning minimises: held-out log-loss plus a prior, as a function of free logarithms.
 
-All parameters of a model, as logarithms in this order, are the kernel's theta, s_n, nugget, a, delta, v_0 and the
-three powers of the pool. A matrix (parameters, free) says how they follow the free ones, from the start on.
+All parameters of a model, as logarithms in this order, are the kernel's theta, s_n, nugget, a, delta, v_0, the
+three powers of the pool and the error rate. A matrix (parameters, free) says how they follow the free ones.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ Progress = Callable[[int, float], None]
 
 _SCALARS = ("s_n", "nugget", "a", "delta", "v_0")
 _POWERS = 3
+_LINK = len(_SCALARS) + _POWERS + 1
 
 
 class Objective:
@@ -49,14 +50,16 @@ class Objective:
         self._packs = [packed(patches[i::threads]) for i in range(threads)]
         self._start, self._free, self._n = start, free, len(patches)
         self._scale, self._progress = spread**2 * len(patches), progress
+        self._n_classes = len(start.prior or ())
         self.evaluations = 0
 
     def model(self, x: F64) -> BlockModel:
         """Return the model of free parameters x (n,)."""
         start, step = self._start, self._free @ x
-        theta, rest = np.split(step, [len(step) - len(_SCALARS) - _POWERS])
-        scalars = {name: getattr(start, name) * float(np.exp(v)) for name, v in zip(_SCALARS, rest)}
-        w = np.array(start.powers) * np.exp(rest[len(_SCALARS) :])
+        theta, factor = step[:-_LINK], np.exp(step[-_LINK:])
+        scalars = {name: getattr(start, name) * float(f) for name, f in zip(_SCALARS, factor)}
+        scalars["error_rate"] = start.error_rate * float(factor[-1])
+        w = np.array(start.powers) * factor[len(_SCALARS) : -1]
         kernel = start.kernel.with_theta(start.kernel.theta + theta)
         return replace(start, kernel=kernel, weights=(float(w[0]), float(w[1]), float(w[2])), **scalars)
 
@@ -67,17 +70,17 @@ class Objective:
     def __call__(self, x: F64) -> tuple[float, F64]:
         """Return value and gradient (n,) at x (n,)."""
         model = self.model(x)
-        D, C = model.n_dims, len(model.prior or ())
+        D, C = model.n_dims, self._n_classes
         kernel, noise, link = mixture(model.kernel, D), model.noise(C), model.link(C)
 
         def run(pack: Packed) -> Gradient:
-            g = Gradient(np.zeros(1), np.zeros((len(kernel.kind), D + 1)), np.zeros(3), np.zeros(5))
+            g = Gradient(np.zeros(1), np.zeros((len(kernel.kind), D + 1)), np.zeros(3), np.zeros(6))
             add_gradient(pack, D, kernel, noise, link, g)
             return g
 
         parts = parallel_map(run, self._packs)
         loss, d_kernel, d_noise, d_link = (sum(part[1:], part[0]) for part in zip(*parts, strict=True))
-        values = np.array([*(getattr(model, name) for name in _SCALARS), *model.powers])
+        values = np.array([*(getattr(model, name) for name in _SCALARS), *model.powers, model.error_rate])
         gradient = np.concatenate([_of_theta(model, d_kernel), np.concatenate([d_noise, d_link]) * values])
         value = float(loss[0]) / self._n + self.penalty(x)
         self.evaluations += 1
@@ -98,8 +101,10 @@ def all_free(model: BlockModel, vertical: int | None) -> F64:
         raise InputError(f"a {model.posterior} model is not learned by trials: learn one of {', '.join(CLOSED)}.")
     n_theta = len(model.kernel.theta)
     groups = _tied(model, vertical)
-    groups += [[n_theta + i] for i in range(0 if model.solves else 3, len(_SCALARS))]
-    groups += [[n_theta + len(_SCALARS) + i] for i, w in enumerate(model.powers) if w > 0]
+    w_i, w_l, w_v = model.powers
+    used = (model.solves, model.solves, w_l > 0, w_i > 0, w_v > 0)
+    groups += [[n_theta + i] for i, matters in enumerate(used) if matters]
+    groups += [[n_theta + len(_SCALARS) + i] for i, w in enumerate((*model.powers, model.error_rate)) if w > 0]
     return _columns(n_theta, groups)
 
 
@@ -111,7 +116,7 @@ def temperature_free(model: BlockModel) -> F64:
 
 def _columns(n_theta: int, groups: list[list[int]]) -> F64:
     """One column for each group of parameters that move together."""
-    free = np.zeros((n_theta + len(_SCALARS) + _POWERS, len(groups)))
+    free = np.zeros((n_theta + _LINK, len(groups)))
     for column, group in enumerate(groups):
         free[group, column] = 1
     return free

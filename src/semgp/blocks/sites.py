@@ -251,7 +251,10 @@ def _add_soft(
     for i in range(len(rows)):
         r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
         for c in range(mass.shape[1]):
-            w = np.int64(np.rint(weights[i, c] * MASS_UNIT))
+            # what the classes lack to one is the mass of the last column, where there is one more than classes
+            w = np.int64(max(MASS_UNIT - int(added), 0))
+            if c < weights.shape[1]:
+                w = np.int64(np.rint(weights[i, c] * MASS_UNIT))
             total += np.int64(mass[r, c])
             added += w
             agreed += float(w) * float(mass[r, c])
@@ -263,7 +266,7 @@ def _add_soft(
 
 
 @njit(cache=True, nogil=True)
-def _add_place(row: np.int64, w: int, fraction: F64, features: F32, place: I64) -> None:
+def _add_place(row: np.int64, w: int | np.int64, fraction: F64, features: F32, place: I64) -> None:
     for d in range(3):
         place[row, d] += w * int(np.rint(fraction[d] * PLACE_UNIT))
     for f in range(len(features)):

@@ -15,7 +15,8 @@ app = App(
     help="Continuous semantic maps by Gaussian processes: class probabilities and uncertainty at any point.",
 )
 app.command("semgp.cli.demo:demo")
-app.command("semgp.cli.maps:build")
+app.command("semgp.cli.build:build")
+app.command("semgp.cli.build:learn")
 app.command("semgp.cli.maps:query")
 app.command("semgp.cli.maps:evaluate")
 app.command("semgp.cli.maps:info")

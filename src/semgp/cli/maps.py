@@ -1,10 +1,10 @@
-"""`semgp build`, `query`, `evaluate` and `info`: scans to a map file, and what the map says."""
+"""`semgp query`, `evaluate` and `info`: what a map file holds and says."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -14,90 +14,14 @@ from semgp.cli.options import JsonOut
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.evaluation.scores import score
-from semgp.gp.model import GPModel
-from semgp.maps.files import load_map, save_map
-from semgp.maps.gp import GPSemanticMap
-from semgp.maps.kinds import MAP_KINDS
-from semgp.maps.learning import learn_model
+from semgp.maps.files import load_map
 from semgp.maps.protocol import SemanticMap
 from semgp.maps.surface import surface_grid
 from semgp.prediction import Prediction
 from semgp.readers import open_scans
 from semgp.writers import write_npz, write_ply
 
-Kind = Literal["gp", "octomap", "knn", "csm", "bki"]
 SCORES = ("points", "coverage", "auc", "accuracy", "miou", "nll", "brier", "ece")
-
-
-def build(
-    scans: list[Path],
-    /,
-    *,
-    out: Path,
-    kind: Kind = "gp",
-    learn: bool = True,
-    max_points: int = 5000,
-    inducing: int = 300,
-    iterations: int = 30,
-    seed: int = 0,
-    quiet: bool = False,
-) -> None:
-    """Build a map from labelled scans and write it to a file.
-
-    Example: semgp build room.ply --out room.semgp
-
-    Parameters
-    ----------
-    scans
-        Point files (.ply, .pcd, .npz) or data-set folders; labels of -1 are missing.
-    out
-        The map file to write.
-    kind
-        The method: the Gaussian-process map, the semantic OctoMap, or a baseline.
-    learn
-        Learn the GP's hyperparameters from the labels of the first scan that has some; otherwise keep the
-        defaults, in metres.
-    max_points
-        At most so many labelled points, drawn at random, train the GP.
-    inducing
-        Inducing points of the GP.
-    iterations
-        Limit of learning steps.
-    seed
-        Seed of every random draw.
-    quiet
-        Show no progress.
-    """
-    if not scans:
-        raise InputError("give at least one scan: a point file or a data-set folder.")
-    sources = [cloud for path in scans for cloud in open_scans(path)]
-    classes = sources[0].classes
-    with progress(quiet) as bars:
-        semantic_map: SemanticMap
-        if kind == "gp":
-            model = GPModel(max_points=max_points, n_inducing=inducing, seed=seed)
-            if learn:
-                bar = bars.add_task("learning hyperparameters", total=None)
-                first = next((cloud for cloud in sources if cloud.labelled.any()), sources[0])
-                model, _ = learn_model(
-                    first,
-                    model,
-                    max_iterations=iterations,
-                    progress=lambda n, nlml: bars.update(
-                        bar, description=f"learning hyperparameters: {n} evaluations, NLML {nlml:.1f}"
-                    ),
-                )
-            semantic_map = GPSemanticMap(classes, model)
-        else:
-            semantic_map = MAP_KINDS[kind](classes)  # type: ignore[call-arg]
-        for cloud in bars.track(sources, description="building the map"):
-            semantic_map.update(cloud)
-        if not len(semantic_map):
-            raise InputError("no scan has a label: nothing to build a map from.")
-        if isinstance(semantic_map, GPSemanticMap):
-            semantic_map.solve()
-    save_map(semantic_map, out)
-    STDOUT.print(f"{out}: {kind} map of {len(semantic_map):,} elements from {len(sources)} scans")
 
 
 def query(

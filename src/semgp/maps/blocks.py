@@ -127,7 +127,7 @@ class ManyBlocks:
         voxels = stored_array(arrays, "voxels", np.int64, (None,))
         made._restore({
             "voxels": voxels,
-            "mass": stored_array(arrays, "mass", np.uint32, (len(voxels), C)),
+            "mass": stored_array(arrays, "mass", np.uint32, (len(voxels), C + made.model.other)),
             "place": stored_array(arrays, "place", np.int64, (len(voxels), D)),
             "origin": stored_array(arrays, "origin", np.int64, (3,)),
         })  # fmt: skip

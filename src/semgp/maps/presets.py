@@ -25,7 +25,10 @@ OUTDOOR_LIDAR = BlockModel(
 )
 """Spinning lidar outdoors, z up, labels of a network: short and long length scales, shorter along the vertical."""
 
-PRESETS: Mapping[str, BlockModel] = {"outdoor-lidar": OUTDOOR_LIDAR}
+INDOOR_RGBD = BlockModel()
+"""A depth camera indoors."""
+
+PRESETS: Mapping[str, BlockModel] = {"indoor-rgbd": INDOOR_RGBD, "outdoor-lidar": OUTDOOR_LIDAR}
 """The models by name."""
 
 

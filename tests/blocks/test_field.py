@@ -1,0 +1,156 @@
+"""Fields in use: what is solved again when, what is kept, and that no history shows in the answers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from semgp.blocks.answer import Answers
+from semgp.blocks.field import Field
+from semgp.blocks.model import BlockModel
+from semgp.blocks.sites import CELL
+from semgp.errors import InputError
+from tests.blocks.naive import Array, featureless, filled, street, voxel_index
+
+MODEL = BlockModel(leaf=12, near=6, far=8)
+EDGE = CELL * MODEL.resolution
+
+
+def assert_same(a: Answers, b: Answers) -> None:
+    for x, y in zip(a, b):
+        np.testing.assert_array_equal(x, y)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.booleans())
+@settings(deadline=None, max_examples=12)
+def test_updates_in_any_order_give_the_bits_of_one_update(seed: int, n_updates: int, ask_between: bool) -> None:
+    rng = np.random.default_rng(seed)
+    points, labels = street(seed % 1000, 600, 3)
+    queries = points[:100] + rng.normal(scale=0.1, size=(100, 3))
+    at_once, step_by_step = filled(MODEL, points, labels, 3), Field(MODEL, 3)
+    for part in np.array_split(rng.permutation(600), n_updates):
+        step_by_step.add(points[part], labels[part], None, featureless(len(part)))
+        if ask_between:
+            step_by_step.query(queries[:10], featureless(10))
+    assert_same(step_by_step.query(queries, featureless(100)), at_once.query(queries, featureless(100)))
+
+
+def test_only_stale_cells_are_solved() -> None:
+    """Cells in a row, one site each: an update reaches its cell and those next to it."""
+    points = np.array([[i * EDGE + 1.0, 1.0, 1.0] for i in range(8)])
+    field = filled(MODEL, points, np.zeros(8, np.int32), 2)
+    assert field.solve() == 8
+    assert field.solve() == 0
+    field.add(points[3:4] + 0.5, np.ones(1, np.int32), None, featureless(1))
+    before = field.store.next_block
+    assert field.store.stale.sum() == 3
+    field.query(points[6:8], featureless(2))  # up to date already
+    assert field.store.next_block == before
+    assert field.solve(np.array([3], np.int32)) == 1
+    assert field.solve() == 2
+
+
+def test_a_query_solves_what_it_needs() -> None:
+    points = np.array([[i * EDGE + 1.0, 1.0, 1.0] for i in range(8)])
+    field = filled(MODEL, points, np.zeros(8, np.int32), 2)
+    field.query(points[2:3], featureless(1))
+    assert field.store.stale.sum() == 7
+    field.query(points[2:3] + [0, EDGE, 0], featureless(1))  # a cell without sites beside one that has some
+    assert (field.store.stale.sum(), len(field.sites.cells)) == (7, 9)
+    field.query(points[2:3] + [0, 3 * EDGE, 0], featureless(1))
+    assert len(field.sites.cells) == 9
+
+
+def test_a_cell_without_sites_answers_from_those_round_about() -> None:
+    model = replace(MODEL, blend=0.01)
+    edge = np.array([[1.0, EDGE - 0.03, 1.0]])
+    field = filled(model, edge, np.zeros(1, np.int32), 2)
+    beyond = edge + [0, 0.06, 0]
+    inside = edge - [0, 0.06, 0]
+    answers = field.query(np.concatenate([beyond, inside]), featureless(2))
+    np.testing.assert_allclose(answers.probability[0], answers.probability[1], atol=2e-3)
+    # once it has sites, it answers from them as well
+    field.add(beyond, np.ones(1, np.int32), None, featureless(1))
+    again = filled(model, np.concatenate([edge, beyond]), np.array([0, 1], np.int32), 2)
+    assert_same(field.query(beyond, featureless(1)), again.query(beyond, featureless(1)))
+
+
+def walked(n_updates: int) -> tuple[Field, Array]:
+    """A short walk back and forth, with a query after each update."""
+    rng = np.random.default_rng(1)
+    field = Field(MODEL, 2)
+    for i in range(n_updates):
+        centre = (6 + 5 * np.sin(i / 3), 2.0, 1.0)
+        points = centre + rng.uniform(-1, 1, (60, 3)) * (1, 1, 0.1)
+        field.add(points, rng.integers(0, 2, 60).astype(np.int32), None, featureless(60))
+        field.query(points[:5], featureless(5))
+    return field, points
+
+
+def test_store_stays_small_over_many_updates() -> None:
+    field, points = walked(60)
+    field.solve()
+    store = field.store
+    fresh = Field(MODEL, 2)
+    fresh.sites.restore(field.sites.to_arrays())
+    fresh.touch(np.arange(len(fresh.sites.cells), dtype=np.int32))
+    fresh.solve()
+    assert len(store.pieces) <= len(field.sites.cells)
+    assert store.next_block > 5 * store.n_blocks  # most blocks that there were are gone
+    trees = store.trees(field.sites.cells)
+    assert len(trees.axes) == len(trees.cuts) <= 3 * (store.n_blocks + 1)
+    assert sum(p.cells for p in store.pieces.values()) == np.count_nonzero(trees.block >= 0)
+    assert store.n_bytes <= 4 * fresh.store.n_bytes
+    assert_same(field.query(points, featureless(60)), fresh.query(points, featureless(60)))
+
+
+def test_blocks_have_numbers_of_their_own() -> None:
+    field, _ = walked(12)
+    field.solve()
+    trees = field.store.trees(field.sites.cells)
+    used = np.concatenate([np.arange(n) + b for b, n in zip(trees.block, trees.leaves) if b >= 0])
+    assert len(set(used.tolist())) == len(used) == field.store.n_blocks
+    for number in used:
+        piece = field.store.piece_of(int(number))
+        assert piece.first <= number < piece.first + len(piece.solved.n)
+    sites_of = np.bincount(field.sites._cell[: len(field.sites)], minlength=len(trees.leaves))
+    assert (sites_of <= trees.leaves * MODEL.leaf).all()
+
+
+def test_tolerance_leaves_what_has_hardly_changed() -> None:
+    points, labels = street(3, 800, 2)
+    field = filled(MODEL, points, labels, 2)
+    field.solve()
+    field.add(points[:3], labels[:3], None, featureless(3))
+    assert field.store.stale.any()
+    assert field.solve(tolerance=0.2) == 0
+    more, labels = street(4, 800, 2)
+    field.add(more, labels, None, featureless(800))
+    assert field.solve(tolerance=0.2) > 0
+    assert field.solve() >= 0
+    both = np.concatenate([points, points[:3], more])
+    again = filled(MODEL, both, np.concatenate([street(3, 800, 2)[1], street(3, 800, 2)[1][:3], labels]), 2)
+    assert_same(field.query(points[:50], featureless(50)), again.query(points[:50], featureless(50)))
+
+
+@pytest.mark.parametrize("shift", [-5e6, 5e6])
+def test_far_from_the_world_s_origin(shift: float) -> None:
+    """Whole cells away, the same map up to the rounding of coordinates of 5000 km."""
+    points, labels = street(5, 500, 3)
+    whole = np.round(shift / EDGE) * EDGE
+    here, there = filled(MODEL, points, labels, 3), filled(MODEL, points + whole, labels, 3)
+    assert (np.sort(voxel_index(here.sites.cells.keys), axis=0).shape) == (len(there.sites.cells), 3)
+    a = here.query(points[:200], featureless(200))
+    b = there.query(points[:200] + whole, featureless(200))
+    np.testing.assert_allclose(a.probability, b.probability, atol=2e-3)
+
+
+def test_nothing_to_solve() -> None:
+    assert Field(MODEL, 2).solve() == 0
+
+
+def test_a_model_for_other_classes_is_refused() -> None:
+    with pytest.raises(InputError, match="3 classes, the map has 2"):
+        Field(replace(MODEL, prior=(0.5, 0.25, 0.25)), 2)
