@@ -19,7 +19,7 @@ Ints = NDArray[np.int64]
 
 
 class Block(NamedTuple):
-    """Members of a block: inputs X (n, D), class mass (n, C), sites joined k (n,)."""
+    """Members of a block: inputs X (n, D), class mass (n, C) or (n, C + 1), sites joined k (n,)."""
 
     X: Array
     mass: Array
@@ -63,7 +63,8 @@ def answer(model: BlockModel, block: Block, Y: Array) -> Belief:
     """The posterior of one block at Y (m, D), formula by formula."""
     X, mass, k = block
     n = mass.sum(axis=1)
-    prior = model.class_prior(mass.shape[1]).astype(np.float64)
+    C = mass.shape[1] - model.other
+    prior = model.class_prior(C).astype(np.float64)
     K, K_all = model.kernel(X, Y), model.kernel(X, X) + np.diag(model.s_n / n + model.nugget / k)
     B = np.linalg.solve(K_all, K)
     indicator = B.T @ (mass / n[:, None] - prior)
@@ -78,19 +79,33 @@ def answer(model: BlockModel, block: Block, Y: Array) -> Belief:
     for w, p in zip(model.powers, predictors):
         pooled *= (p / p.sum(axis=1, keepdims=True)) ** w
     variance = model.kernel.diag(Y) - (K * B).sum(axis=0)
-    return Belief(pooled / pooled.sum(axis=1, keepdims=True), indicator + prior, variance)
+    pooled /= pooled.sum(axis=1, keepdims=True)
+    return Belief(less_errors(model, pooled, C), (indicator + prior)[:, :C], variance)
+
+
+def less_errors(model: BlockModel, pooled: Array, n_classes: int) -> Array:
+    """Probabilities (m, C) of pooled ones, (m, C) or with the mass of no class (m, C + 1), less the errors."""
+    nothing = pooled[:, n_classes:].sum(axis=1, keepdims=True)
+    s = pooled[:, :n_classes] / (1 - nothing)
+    if model.error_rate == 0:
+        return s
+    r = np.ones(n_classes) if model.errors is None else np.asarray(model.errors)
+    m = s.max(axis=1, keepdims=True)
+    w = model.error_rate * ((1 - m) / m * (nothing if model.other else 1)) ** model.error_power
+    return np.asarray((s + w * r / r.sum()) / (1 + w))
 
 
 def blended(field: Field, pairs: Pairs, n_points: int, features: NDArray[np.float32]) -> Belief:
     """The answers of all pairs, each by `answer` from the members that its block has, added up."""
-    C = field.sites.mass.shape[1]
+    C = field.sites.mass.shape[1] - field.model.other
     total = Belief(np.zeros((n_points, C)), np.zeros((n_points, C)), np.zeros(n_points))
-    prior = field.model.class_prior(C).astype(np.float64)
+    prior = field.model.class_prior(C)[:C].astype(np.float64)
+    prior /= prior.sum()
     for point, number, w, local in zip(pairs.point, pairs.block, pairs.weight, pairs.local):
         one = Belief(prior[None], prior[None], np.array([field.prior_variance]))
         if number >= 0:
             piece = field.store.piece_of(int(number))
-            block = block_of(piece.solved, int(number) - piece.first, C)
+            block = block_of(piece.solved, int(number) - piece.first, C + field.model.other)
             one = answer(field.model, block, np.concatenate([local, features[point]])[None].astype(np.float64))
         for sum_of, value in zip(total, one):
             sum_of[point] += w * value[0]

@@ -57,18 +57,20 @@ def test_a_query_solves_what_it_needs() -> None:
     field = filled(MODEL, points, np.zeros(8, np.int32), 2)
     field.query(points[2:3], featureless(1))
     assert field.store.stale.sum() == 7
-    field.query(points[2:3] + [0, EDGE, 0], featureless(1))  # a cell without sites beside one that has some
+    field.query(
+        points[2:3] + np.array([0, EDGE, 0]), featureless(1)
+    )  # a cell without sites beside one that has some
     assert (field.store.stale.sum(), len(field.sites.cells)) == (7, 9)
-    field.query(points[2:3] + [0, 3 * EDGE, 0], featureless(1))
+    field.query(points[2:3] + np.array([0, 3 * EDGE, 0]), featureless(1))
     assert len(field.sites.cells) == 9
 
 
 def test_a_cell_without_sites_answers_from_those_round_about() -> None:
     model = replace(MODEL, blend=0.01)
-    edge = np.array([[1.0, EDGE - 0.03, 1.0]])
+    edge, step = np.array([[1.0, EDGE - 0.03, 1.0]]), np.array([0, 0.06, 0])
     field = filled(model, edge, np.zeros(1, np.int32), 2)
-    beyond = edge + [0, 0.06, 0]
-    inside = edge - [0, 0.06, 0]
+    beyond = edge + step
+    inside = edge - step
     answers = field.query(np.concatenate([beyond, inside]), featureless(2))
     np.testing.assert_allclose(answers.probability[0], answers.probability[1], atol=2e-3)
     # once it has sites, it answers from them as well

@@ -1,5 +1,6 @@
 """What learning minimises: value and gradient against the formulas in double precision and differences of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,15 +32,20 @@ MODELS = {
     "log-ratio": replace(PLAIN, weights=(0.0, 0.8, 0.0), a=0.6),
     "vote": replace(PLAIN, posterior="vote", weights=(0.0, 0.0, 0.7), v_0=0.4),
     "ARD": LEVEL,
+    "errors": replace(PLAIN, error_rate=0.3, errors=(0.1, 0.1, 0.2, 0.2, 0.4)),
+    "other": replace(PLAIN, other=True),
+    "errors by other": replace(PLAIN, other=True, error_rate=0.8, error_power=0.7, errors=PRIOR),
     "features": FEATURES,
 }
 
 
-def patches(n_dims: int) -> list[Patch]:
+def patches(model: BlockModel) -> list[Patch]:
     """Members of some of the classes, and held-out labels of all of them."""
+    n_dims, nothing = model.n_dims, [C] if model.other else []
     rng = np.random.default_rng(n_dims)
     made = []
-    for n, present in ((9, [0, 1, 3]), (30, [2]), (26, [0, 1, 2, 3, 4]), (1, [4]), (17, [1, 2])):
+    every = [0, 1, 2, 3, 4, *nothing]
+    for n, present in ((9, [0, 1, 3]), (30, [2, *nothing]), (26, every), (1, [4]), (17, [1, 2, *nothing])):
         mass = rng.dirichlet(np.full(len(present), 0.7), n).T * rng.integers(1, 9, n)
         X, Y = (rng.uniform(0, 2, (n_dims, m)).astype(np.float32) for m in (n, 12))
         k, labels = rng.integers(1, 5, n).astype(np.float32), rng.integers(0, C, 12).astype(np.int32)
@@ -50,7 +56,7 @@ def patches(n_dims: int) -> list[Patch]:
 def mean_loss(model: BlockModel, all_patches: list[Patch]) -> float:
     losses = []
     for p in all_patches:
-        mass = np.zeros((len(p.k), C))
+        mass = np.zeros((len(p.k), C + model.other))
         mass[:, p.present] = p.mass.T
         block = Block(p.X.T.astype(np.float64), mass, p.k.astype(np.float64))
         chance = answer(model, block, p.Y.T.astype(np.float64)).probability
@@ -72,11 +78,11 @@ def differences(objective: Objective, all_patches: list[Patch], x: Array, spread
 @pytest.mark.parametrize("which", ["each", "all free", "temperature"])
 def test_value_and_gradient(name: str, which: str) -> None:
     start = MODELS[name]
-    n = len(start.kernel.theta) + 8
+    n = len(start.kernel.theta) + 9
     free = {"each": np.eye(n), "all free": all_free(start, vertical=2), "temperature": temperature_free(start)}[
         which
     ]
-    all_patches = patches(start.n_dims)
+    all_patches = patches(start)
     objective = Objective(start, all_patches, free, 0.7, None)
     x = np.random.default_rng(1).normal(scale=0.2, size=free.shape[1])
     value, gradient = objective(x)
@@ -87,7 +93,7 @@ def test_value_and_gradient(name: str, which: str) -> None:
 
 def test_gradient_is_that_of_the_compiled_value() -> None:
     free = all_free(PLAIN, None)
-    objective = Objective(PLAIN, patches(3), free, 0.7, None)
+    objective = Objective(PLAIN, patches(PLAIN), free, 0.7, None)
     x = np.full(free.shape[1], 0.1)
     _, gradient = objective(x)
     steps = 0.05 * np.eye(len(x))
@@ -98,7 +104,7 @@ def test_gradient_is_that_of_the_compiled_value() -> None:
 
 def test_start_and_prior() -> None:
     calls: list[tuple[int, float]] = []
-    objective = Objective(PLAIN, patches(3), all_free(PLAIN, None), 0.5, lambda n, v: calls.append((n, v)))
+    objective = Objective(PLAIN, patches(PLAIN), all_free(PLAIN, None), 0.5, lambda n, v: calls.append((n, v)))
     zero = np.zeros(all_free(PLAIN, None).shape[1])
     again = objective.model(zero)
     np.testing.assert_allclose(again.kernel.theta, PLAIN.kernel.theta)
@@ -115,7 +121,7 @@ def columns(free: Array) -> list[list[int]]:
 
 
 class TestFree:
-    """Parameters: theta, then s_n, nugget, a, delta, v_0 and three powers."""
+    """Parameters: theta, then s_n, nugget, a, delta, v_0, three powers and the error rate."""
 
     @pytest.mark.parametrize(
         ("vertical", "first"),
@@ -133,13 +139,14 @@ class TestFree:
         assert groups[:9] == [[0], [1], [2, 3], [4], [5], [6], [7], [8], [9]]
 
     @pytest.mark.parametrize(
-        ("name", "rest"), [("pool", range(4, 12)), ("indicator", range(4, 10)), ("vote", (7, 8, 11))]
+        ("name", "rest"),
+        [("pool", range(4, 12)), ("indicator", [4, 5, 7, 9]), ("vote", [8, 11]), ("errors", range(4, 13))],
     )
-    def test_powers_of_zero_stay(self, name: str, rest: range | tuple[int, ...]) -> None:
+    def test_powers_of_zero_stay(self, name: str, rest: Sequence[int]) -> None:
         assert columns(all_free(MODELS[name], None))[4:] == [[i] for i in rest]
 
     def test_temperature_is_one_factor_of_all_powers(self) -> None:
-        objective = Objective(PLAIN, patches(3), temperature_free(PLAIN), 0.7, None)
+        objective = Objective(PLAIN, patches(PLAIN), temperature_free(PLAIN), 0.7, None)
         warm = objective.model(np.array([np.log(2.0)]))
         assert warm.powers == pytest.approx([2 * w for w in PLAIN.powers])
         assert replace(warm, weights=PLAIN.weights) == replace(PLAIN, kernel=warm.kernel)
@@ -155,6 +162,6 @@ def test_patches_may_have_different_numbers_of_points() -> None:
         Y: NDArray[np.float32] = np.ascontiguousarray(p.Y[:, :m])
         return p._replace(Y=Y, label=p.label[:m])
 
-    uneven = [cut(p, m) for p, m in zip(patches(3), (1, 12, 5, 7, 2))]
-    objective = Objective(PLAIN, uneven, np.eye(12), 0.7, None)
-    assert objective(np.zeros(12))[0] == pytest.approx(mean_loss(PLAIN, uneven), rel=2e-5)
+    uneven = [cut(p, m) for p, m in zip(patches(PLAIN), (1, 12, 5, 7, 2))]
+    objective = Objective(PLAIN, uneven, np.eye(13), 0.7, None)
+    assert objective(np.zeros(13))[0] == pytest.approx(mean_loss(PLAIN, uneven), rel=2e-5)

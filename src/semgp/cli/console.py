@@ -43,7 +43,7 @@ def write_json(path: Path | None, value: Any) -> None:
 
 HEADINGS = {
     **{"auc": "AUC", "miou": "mIoU", "nll": "NLL", "ece": "ECE", "brier": "Brier", "n_train": "labels"},
-    **{"fit_seconds": "fit s", "query_seconds": "query s", "peak_rss_mb": "MB"},
+    **{"learn_seconds": "learn s", "fit_seconds": "fit s", "query_seconds": "query s", "peak_rss_mb": "MB"},
 }
 
 

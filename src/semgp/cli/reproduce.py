@@ -19,7 +19,7 @@ reproduce = App(name="reproduce", help="Run the experiments of the paper on real
 
 COLUMNS = (
     *("frame", "method", "auc", "accuracy", "miou", "nll", "ece", "coverage"),
-    *("n_train", "fit_seconds", "query_seconds", "peak_rss_mb"),
+    *("n_train", "learn_seconds", "fit_seconds", "query_seconds", "peak_rss_mb"),
 )
 
 
@@ -52,7 +52,8 @@ def nyu(
     frames
         Frame numbers, from 1, with commas between; the default is the paper's four.
     methods
-        Names with commas between: gpsm, gpsm-averaged, knn, knn-all, 1nn-all, knn-256, octomap, csm, bki.
+        Names with commas between: blocks, vote, gpsm, gpsm-averaged, knn, knn-all, 1nn-all, knn-256, octomap, csm,
+        bki. The first two learn their models from eight other frames of the data set.
     soft
         The network's class probabilities instead of its hard labels; noisy experiment only.
     classes
@@ -69,11 +70,12 @@ def nyu(
         Show no progress and no table.
     """
     from semgp.evaluation.figures import camera_view
-    from semgp.evaluation.nyu import METHODS, nyu_task
+    from semgp.evaluation.nyu import nyu_task
+    from semgp.evaluation.nyu_blocks import NYUBlocks
     from semgp.readers import open_nyu
 
-    chosen = _choose(methods, METHODS)
     source = open_nyu(data)
+    chosen = _choose(methods, NYUBlocks(source, classes, seed).methods())
     tasks = (nyu_task(source.read(f, classes), experiment, soft, seed) for f in _numbers("frames", frames, int))
     view = (lambda task: camera_view(task.truth)) if report else None
     settings = {"experiment": experiment, "soft": soft, "classes": classes, "seed": seed}
@@ -105,7 +107,7 @@ def semantickitti(
     keep
         Shares of the points whose labels the map gets, with commas between.
     methods
-        Names with commas between: labels, csm, bki, bki-wide, knn, octomap.
+        Names with commas between: blocks, vote, labels, csm, bki, bki-wide, knn, octomap.
     scans
         So many of the first scans.
     seed
