@@ -9,6 +9,7 @@ from numba import njit
 
 from semgp.blocks.arrays import F32, I16, I64
 from semgp.blocks.covariance import Mixture, covariance_tile
+from semgp.blocks.linear import unpack
 from semgp.blocks.link import Link, class_probabilities, error_shares
 from semgp.blocks.pairs import Pairs
 from semgp.blocks.solve import SHARED, Solved
@@ -18,10 +19,9 @@ TILE = 64
 
 
 class Answers(NamedTuple):
-    """What is added up: probability (M, C), mean (M, C) and variance (M,)."""
+    """What is added up: probability (M, C) and latent variance (M,), which all classes share."""
 
     probability: F32
-    mean: F32
     variance: F32
 
 
@@ -47,7 +47,7 @@ def answer_pairs(
     pairs : Pairs
         All pairs.
     order : (n,) array
-        The pairs to answer, by block; no point occurs twice.
+        The pairs to answer, by block.
     features : (M, F) array
         The points' inputs beyond position; a row of NaN takes the features of the block's nearest member.
     kernel : Mixture
@@ -66,6 +66,8 @@ def answer_pairs(
     prior_variance = np.float32(0)
     for k in range(len(kernel.variance)):
         prior_variance += kernel.variance[k]
+    L_flat = np.empty(T * T, np.float32)
+    unpacked = -1
     begin = 0
     while begin < len(order):
         number = pairs.block[order[begin]]
@@ -87,8 +89,11 @@ def answer_pairs(
         F = F_flat[: W * m].reshape(W, m)
         np.dot(solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n), K.T, F)
         if solved.at_factor[b + 1] > solved.at_factor[b]:
-            V = V_flat[: m * n].reshape(m, n)
-            np.dot(K, solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]].reshape(n, n).T, V)
+            V, L_inverse = V_flat[: m * n].reshape(m, n), L_flat[: n * n].reshape(n, n)
+            if unpacked != b:
+                unpack(solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]], L_inverse)
+                unpacked = b
+            np.dot(K, L_inverse.T, V)
             _unexplained(V, prior_variance, variance)
         else:
             _explained_by_vote(F[2 + 2 * P], prior_variance, link.v_0, variance, m)
@@ -96,7 +101,7 @@ def answer_pairs(
         class_probabilities(F, solved.present[b, :P], m, link, p)
         if link.other or link.error_rate > 0:
             error_shares(p, solved.present[b, :P], m, link, u)
-        _add(pairs, order, begin, m, solved.present[b, :P], p, u, F, variance, link, answers)
+        _add(pairs, order, begin, m, solved.present[b, :P], p, u, variance, link, answers)
         begin = end
 
 
@@ -109,7 +114,6 @@ def answer_prior(pairs: Pairs, order: I64, prior_variance: float, link: Link, an
         point, w = pairs.point[i], pairs.weight[i]
         for c in range(answers.probability.shape[1]):
             answers.probability[point, c] += w * known[c]
-            answers.mean[point, c] += w * link.prior[c]
         answers.variance[point] += w * np.float32(prior_variance)
 
 
@@ -151,7 +155,6 @@ def _add(
     present: I16,
     p: F32,
     u: F32,
-    F: F32,
     variance: F32,
     link: Link,
     answers: Answers,
@@ -161,14 +164,11 @@ def _add(
         pair = order[begin + q]
         point, w = pairs.point[pair], pairs.weight[pair]
         answers.variance[point] += w * variance[q]
-        out, mean = answers.probability[point], answers.mean[point]
-        absent, left = w * p[P, q], w * (1 - F[0, q])
+        out, absent = answers.probability[point], w * p[P, q]
         k = 0
         for c in range(len(out)):
             if k < P and present[k] == c:
                 out[c] += w * (p[k, q] + u[q] * link.errors[c])
-                mean[c] += w * (F[2 + k, q] + link.prior[c])
                 k += 1
             else:
                 out[c] += absent * link.power[c] + w * u[q] * link.errors[c]
-                mean[c] += left * link.prior[c]

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from semgp.blocks.arrays import F32, F64, I64
 from semgp.blocks.field import Field
 from semgp.blocks.inputs import add_cloud, cloud_features
 from semgp.blocks.model import BlockModel
@@ -19,8 +18,6 @@ Trial = tuple[Sequence[LabelledCloud], Sequence[LabelledCloud]]
 
 HELD_OUT = 32
 """At most so many of the judges' points in a patch."""
-
-_POINT = 1e-6  # edge in voxels of a box that lies in one leaf
 
 
 def draw_patches(
@@ -45,8 +42,8 @@ def draw_patches(
     if not len(points) or not len(field.sites):
         return []
     shuffled = rng.permutation(len(points))
-    drawn = _blocks(field, points[shuffled[:n]], solve=True)[0]
-    block, local = _blocks(field, points[shuffled], solve=False)
+    drawn = field.home(points[shuffled[:n]], solve=True)[0]
+    block, local = field.home(points[shuffled])
     order = np.argsort(block, kind="stable")
     ranked = block[order]
     patches = []
@@ -59,10 +56,3 @@ def draw_patches(
             Y = np.concatenate([local[here], features[rows]], axis=1)
             patches.append(patch(piece.solved, int(b - piece.first), Y, labels[rows]))
     return patches
-
-
-def _blocks(field: Field, points: F64, solve: bool) -> tuple[I64, F32]:
-    """The block (M,) whose leaf each point lies in, -1 for none, and the point's place (M, 3) in its cell."""
-    pairs = field.pairs(points, _POINT, solve)
-    first = np.flatnonzero(pairs.rank == 0)
-    return pairs.block[first], pairs.local[first]

@@ -34,9 +34,8 @@ def answer_by_experts(
         rows = order[a:b]
         points, w = pairs.point[rows], pairs.weight[rows]
         X = np.concatenate([pairs.local[rows], _known(features[points], piece, number, pairs.local[rows])], axis=1)
-        probability, mean, variance = piece.experts[number].predict(X.astype(np.float64))
+        probability, variance = piece.experts[number].predict(X.astype(np.float64))
         answers.probability[points] += w[:, None] * probability
-        answers.mean[points] += w[:, None] * mean
         answers.variance[points] += w * variance
 
 

@@ -19,8 +19,8 @@ from semgp.gp.model import GPModel
 class BlockExpert(Protocol):
     """The posterior of one block."""
 
-    def predict(self, X: Array) -> tuple[Array, Array, Array]:
-        """Return probability (m, C), latent mean (m, C) and variance (m,) at inputs X (m, D)."""
+    def predict(self, X: Array) -> tuple[Array, Array]:
+        """Return probability (m, C) and latent variance (m,), a mean over classes, at inputs X (m, D)."""
         ...
 
 
@@ -55,14 +55,14 @@ class DirichletExpert:
             self._coefficients[:, c] = cho_solve(factor, Y[:, c])
             self._factors.append(factor)
 
-    def predict(self, X: Array) -> tuple[Array, Array, Array]:
-        """Return probability (m, C), latent mean (m, C) and variance (m,) at inputs X (m, D)."""
+    def predict(self, X: Array) -> tuple[Array, Array]:
+        """Return probability (m, C) and latent variance (m,), a mean over classes, at inputs X (m, D)."""
         K = self._kernel(X, self._X)
         f = self._mean0 + K @ self._coefficients
         p = np.exp(f - f.max(axis=1, keepdims=True))
         reduced = [np.einsum("ij,ji->i", K, cho_solve(factor, K.T)) for factor in self._factors]
         variance = self._kernel.diag(X) - np.mean(reduced, axis=0)
-        return p / p.sum(axis=1, keepdims=True), f, np.maximum(variance, 0)
+        return p / p.sum(axis=1, keepdims=True), np.maximum(variance, 0)
 
 
 class PaperExpert:
@@ -75,12 +75,11 @@ class PaperExpert:
         shares = mass[:, self._present] / mass.sum(axis=1, keepdims=True)
         self._expert = fit_expert(gp, self._present, X, shares)
 
-    def predict(self, X: Array) -> tuple[Array, Array, Array]:
-        """Return probability (m, C), latent mean (m, C) and variance (m,) at inputs X (m, D)."""
+    def predict(self, X: Array) -> tuple[Array, Array]:
+        """Return probability (m, C) and latent variance (m,), a mean over classes, at inputs X (m, D)."""
         C = len(self._prior)
         absent = 1 / (self._n + C)  # Laplace's rule of succession
-        probability, mean = np.full((len(X), C), absent), np.zeros((len(X), C))
-        p, f, s2 = self._expert.predict(X)
+        probability = np.full((len(X), C), absent)
+        p, _, s2 = self._expert.predict(X)
         probability[:, self._present] = p * (1 - absent * (C - len(self._present)))
-        mean[:, self._present] = f
-        return probability, mean, s2.mean(axis=1)
+        return probability, s2.mean(axis=1)

@@ -12,14 +12,14 @@ from semgp.blocks.covariance import mixture
 from semgp.blocks.expert_answer import answer_by_experts
 from semgp.blocks.layout import around_keys, lay_out, neighbours
 from semgp.blocks.model import EXPERTS, BlockModel
-from semgp.blocks.pairs import Pairs, find_pairs, mark_cells
+from semgp.blocks.pairs import find_pairs, home_blocks, mark_cells
 from semgp.blocks.sites import CELL, Sites
 from semgp.blocks.solve import Solved, solve_cells
-from semgp.blocks.store import BlockStore, Piece
+from semgp.blocks.store import BlockStore, sorted_by
 from semgp.parallel import n_workers, parallel_map, slices
 
-_QUERY_SLICE = 16_384
-_JOB = 4_096  # pairs that one thread answers at a time
+_SLICE = 16_384
+_JOB = 4_096  # points that one thread answers at a time
 
 
 class Field:
@@ -85,55 +85,74 @@ class Field:
         tree_at = np.concatenate([[0], (leaves - 1).cumsum()])
         axes, cuts = np.empty(tree_at[-1], dtype=np.int8), np.empty(tree_at[-1], dtype=np.float32)
 
-        def run(part: slice) -> Solved:
+        parts = _even_slices(leaves)
+        T = self.model.members
+        factor_size = T * (T + 1) // 2 if self._noise.solve else 0
+        rooms = [store.room(int(leaves[part].sum()) * factor_size) for part in parts]
+
+        def run(part: slice, room: F32) -> Solved:
             return solve_cells(
                 layout, place[todo[part]].astype(np.int64), place[around[part]], CELL * sites.resolution,
                 self.model.sizes(), self._kernel, self._noise, leaves[part], tree_at[part], axes, cuts,
+                room,
             )  # fmt: skip
 
-        parts = _even_slices(leaves)
+        solved = parallel_map(lambda job: run(*job), zip(parts, rooms, strict=True))
         sites.drift[todo] = 0
-        store.replace(todo, leaves, block_at, parts, parallel_map(run, parts), axes, cuts)
+        store.replace(todo, leaves, block_at, parts, solved, axes, cuts)
         return len(todo)
 
     def query(self, points: F64, features: F32, tolerance: float = 0.0) -> Answers:
         """Answer at points (M, 3) with features (M, F), NaN where unknown; stale blocks are solved first."""
-        pairs = self.pairs(points, self.model.blend / 2, tolerance=tolerance)
-        M, C = len(points), self._n_classes
-        answers = Answers(np.zeros((M, C), np.float32), np.zeros((M, C), np.float32), np.zeros(M, np.float32))
+        half = self.model.blend / 2
+        self._solve_round(points, half, tolerance)
+        origin, trees = self._origin(), self.store.trees(self.sites.cells)
+        answers = Answers(np.zeros((len(points), self._n_classes), np.float32), np.zeros(len(points), np.float32))
 
-        def run(job: tuple[Piece | None, I64]) -> None:
-            piece, order = job
-            if piece is None:
-                answer_prior(pairs, order, self.prior_variance, self._link, answers)
-            elif self.model.posterior in EXPERTS:
-                answer_by_experts(self.model, piece, pairs, order, features, self._link.prior, answers)
-            else:
-                answer_pairs(piece.solved, piece.first, pairs, order, features, self._kernel, self._link, answers)
+        def run(chosen: I64) -> None:
+            pairs = find_pairs(points, chosen, self.sites.resolution, origin, half, trees)
+            for piece, order in self.store.by_piece(pairs.block):
+                if piece is None:
+                    answer_prior(pairs, order, self.prior_variance, self._link, answers)
+                elif self.model.posterior in EXPERTS:
+                    answer_by_experts(self.model, piece, pairs, order, features, self._link.prior, answers)
+                else:
+                    answer_pairs(
+                        piece.solved, piece.first, pairs, order, features, self._kernel, self._link, answers
+                    )
 
-        # a point's first pair in the first turn, its second in the second: no two threads add to one point
-        for turn in range(int(pairs.rank.max(initial=-1)) + 1):
-            mine = np.flatnonzero(pairs.rank == turn)
-            order = mine[np.argsort(pairs.block[mine], kind="stable")]
-            parallel_map(run, self.store.jobs(pairs.block[order], order, _JOB))
+        # points of one block come together, and one thread answers each point
+        order = sorted_by(self.home(points)[0])
+        parallel_map(run, [order[s] for s in slices(len(points), _JOB)])
         return answers
 
-    def pairs(self, points: F64, half: float, solve: bool = True, tolerance: float = 0.0) -> Pairs:
-        """Return which blocks answer points (M, 3), with boxes of 2 * half voxels; solve stale ones, or not."""
-        sites, parts = self.sites, list(slices(len(points), _QUERY_SLICE))
-        assert sites.origin is not None, "a field without sites cannot be asked"
-        origin = sites.origin.astype(np.float64)
+    def home(self, points: F64, solve: bool = False) -> tuple[I64, F32]:
+        """Return the block (M,) in whose leaf each point lies, -1 for none, and its place (M, 3) in the cell."""
         if solve:
-            needed = np.zeros(len(sites.cells), dtype=bool)
-            table = sites.cells.slots, sites.cells.keys, needed
-            unknown = parallel_map(lambda s: mark_cells(points[s], sites.resolution, origin, half, *table), parts)
-            empty = self._empty_cells(np.unique(np.concatenate([*unknown, np.empty(0, np.int64)])))
-            self.solve(np.concatenate([np.flatnonzero(needed).astype(np.int32), empty]), tolerance)
-        trees = self.store.trees(sites.cells)
-        found_pairs = parallel_map(
-            lambda s: find_pairs(points[s], s.start, sites.resolution, origin, half, trees), parts or [slice(0, 0)]
+            self._solve_round(points, 0.0, 0.0)
+        origin, trees = self._origin(), self.store.trees(self.sites.cells)
+        block, local = np.empty(len(points), np.int64), np.empty((len(points), 3), np.float32)
+
+        def run(s: slice) -> None:
+            home_blocks(points[s], self.sites.resolution, origin, trees, block[s], local[s])
+
+        parallel_map(run, slices(len(points), _SLICE))
+        return block, local
+
+    def _solve_round(self, points: F64, half: float, tolerance: float) -> None:
+        """Solve the stale cells that boxes round points overlap."""
+        sites, origin = self.sites, self._origin()
+        needed = np.zeros(len(sites.cells), dtype=bool)
+        table = sites.cells.slots, sites.cells.keys, needed
+        unknown = parallel_map(
+            lambda s: mark_cells(points[s], sites.resolution, origin, half, *table), slices(len(points), _SLICE)
         )
-        return Pairs(*(np.concatenate(columns) for columns in zip(*found_pairs)))
+        empty = self._empty_cells(np.unique(np.concatenate([*unknown, np.empty(0, np.int64)])))
+        self.solve(np.concatenate([np.flatnonzero(needed).astype(np.int32), empty]), tolerance)
+
+    def _origin(self) -> F64:
+        assert self.sites.origin is not None, "a field without sites cannot be asked"
+        return self.sites.origin.astype(np.float64)
 
     def _empty_cells(self, keys: I64) -> I32:
         """Return new cells, without sites, for those keys that have a cell with sites round about."""

@@ -34,6 +34,31 @@ def inverse_factor(A: F32, out: F32) -> None:
             A[e:, e:] -= np.dot(panel, panel.T)
 
 
+@njit(cache=True, nogil=True)
+def packed_size(n: int) -> int:
+    """Return the numbers in a lower triangle of n rows."""
+    return n * (n + 1) // 2
+
+
+@njit(cache=True, nogil=True)
+def pack(L: F32, flat: F32) -> None:
+    """Write the lower triangle of L (n, n) row by row: half the memory, and fresh memory is slow."""
+    at = 0
+    for i in range(len(L)):
+        flat[at : at + i + 1] = L[i, : i + 1]
+        at += i + 1
+
+
+@njit(cache=True, nogil=True)
+def unpack(flat: F32, L: F32) -> None:
+    """Fill L (n, n) from its lower triangle; zeros above the diagonal."""
+    at = 0
+    for i in range(len(L)):
+        L[i, : i + 1] = flat[at : at + i + 1]
+        L[i, i + 1 :] = 0
+        at += i + 1
+
+
 @njit(cache=True, nogil=True, fastmath=True)
 def _factor(A: F32, a: int, b: int) -> None:
     """Cholesky factor of A[a:b, a:b] in its place, row by row."""

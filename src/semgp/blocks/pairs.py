@@ -20,14 +20,13 @@ _MOST = 64  # leaves of one cell, and blocks in all, that may answer one point
 
 
 class Pairs(NamedTuple):
-    """Point, block, weight and place among the point's pairs, all (n,); block -1 where the map knows nothing.
+    """Point, block and weight, all (n,), point by point; block -1 where the map knows nothing.
 
     local (n, 3): the point in metres from the lowest corner of the block's cell.
     """
 
     point: I32
     block: I64
-    rank: I32
     weight: F32
     local: F32
 
@@ -76,15 +75,15 @@ def mark_cells(
 
 
 @njit(cache=True, nogil=True)
-def find_pairs(points: F64, first: int, resolution: float, origin: F64, half: float, trees: CellTrees) -> Pairs:
-    """Return the pairs of points, whose numbers count from `first`.
+def find_pairs(points: F64, chosen: I64, resolution: float, origin: F64, half: float, trees: CellTrees) -> Pairs:
+    """Return the pairs of some points.
 
     Parameters
     ----------
     points : (M, 3) array
         Metres, world frame.
-    first : int
-        Number of the first point.
+    chosen : (n,) array
+        The points that are asked for.
     resolution : float
         Edge of a voxel in metres.
     origin : (3,) array
@@ -94,32 +93,29 @@ def find_pairs(points: F64, first: int, resolution: float, origin: F64, half: fl
     trees : CellTrees
         The solved cells.
     """
-    capacity = 2 * len(points) + 2 * _MOST
-    point, block, rank = np.empty(capacity, np.int32), np.empty(capacity, np.int64), np.empty(capacity, np.int32)
+    capacity = 2 * len(chosen) + 8 * _MOST
+    point, block = np.empty(capacity, np.int32), np.empty(capacity, np.int64)
     weight, local = np.empty(capacity, np.float32), np.empty((capacity, 3), np.float32)
     leaves, shares = np.empty(_MOST, np.int64), np.empty(_MOST, np.float32)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     box_low, box_high = np.empty(3, np.float32), np.empty(3, np.float32)
     v, part = np.empty(3), np.empty(3)
     n = 0
-    for i in range(len(points)):
+    for i in chosen:
         if n + 8 * _MOST > capacity:
             capacity = 2 * capacity + 8 * _MOST
-            point, block, rank = _longer(point, capacity), _longer(block, capacity), _longer(rank, capacity)
-            weight, grown = _longer(weight, capacity), np.empty((capacity, 3), np.float32)
-            grown[:n] = local[:n]
-            local = grown
+            point, block = _longer(point, capacity), _longer(block, capacity)
+            weight, local = _longer(weight, capacity), _longer(local, capacity)
         inside = True
         for d in range(3):
             v[d] = points[i, d] / resolution - origin[d]
             inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
             low[d], high[d] = _cell(v[d] - half), _cell(v[d] + half)
         if not inside:
-            point[n], block[n], rank[n], weight[n] = first + i, -1, 0, 1
+            point[n], block[n], weight[n] = i, -1, 1
             local[n, :] = 0
             n += 1
             continue
-        ranked = 0
         for x in range(low[0], high[0] + 1):
             part[0] = _share(v[0], half, x, low[0], high[0])
             for y in range(low[1], high[1] + 1):
@@ -145,14 +141,37 @@ def find_pairs(points: F64, first: int, resolution: float, origin: F64, half: fl
                         leaves[0], shares[0] = 0, 1
                     base = n
                     for k in range(found):
-                        point[n], rank[n] = first + i, ranked
+                        point[n] = i
                         block[n] = trees.block[cell] + leaves[k] if known else -1
                         weight[n] = part[2] * shares[k]
                         for d in range(3):
                             local[n, d] = local[base, d]
                         n += 1
-                        ranked += 1
-    return Pairs(point[:n], block[:n], rank[:n], weight[:n], local[:n])
+    return Pairs(point[:n], block[:n], weight[:n], local[:n])
+
+
+@njit(cache=True, nogil=True)
+def home_blocks(points: F64, resolution: float, origin: F64, trees: CellTrees, block: I64, local: F32) -> None:
+    """Fill in the block (M,) in whose leaf each point lies, -1 for none, and its place (M, 3) in the cell."""
+    corner, v = np.empty(3, np.int64), np.empty(3)
+    place = np.empty(3, np.float32)
+    leaf, share = np.empty(1, np.int64), np.empty(1, np.float32)
+    for i in range(len(points)):
+        inside = True
+        for d in range(3):
+            v[d] = points[i, d] / resolution - origin[d]
+            inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
+        block[i] = -1
+        local[i] = 0
+        if not inside:
+            continue
+        for d in range(3):
+            corner[d] = _cell(v[d])
+            place[d] = local[i, d] = (v[d] - corner[d] * CELL) * resolution
+        cell = trees.slots[slot_of(_key(corner[0], corner[1], corner[2]), trees.slots, trees.keys)]
+        if cell >= 0 and trees.block[cell] >= 0:
+            overlapped(trees.axes, trees.cuts, trees.tree_at[cell], trees.leaves[cell], place, place, leaf, share)
+            block[i] = trees.block[cell] + leaf[0]
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -181,6 +200,6 @@ def _share(v: float, half: float, x: int, low: int, high: int) -> float:
 
 @njit(cache=True, nogil=True)
 def _longer(a: Any, n: int) -> Any:
-    out = np.empty(n, a.dtype)
+    out = np.empty((n, *a.shape[1:]), a.dtype)
     out[: len(a)] = a
     return out

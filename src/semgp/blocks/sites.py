@@ -138,12 +138,14 @@ class Sites:
         rows = self.voxels.insert(voxel_keys(points, self.resolution, self.origin))
         self._grow()
         self._link(known)
-        fraction = points / self.resolution
-        fraction -= np.floor(fraction)
         if labels is not None:
-            _add_hard(rows, labels, fraction, features, self._cell, self._mass, self._place, self.drift)
+            _add_hard(
+                rows, labels, points, self.resolution, features, self._cell, self._mass, self._place, self.drift
+            )
         elif weights is not None:
-            _add_soft(rows, weights, fraction, features, self._cell, self._mass, self._place, self.drift)
+            _add_soft(
+                rows, weights, points, self.resolution, features, self._cell, self._mass, self._place, self.drift
+            )
         touched = np.zeros(len(self.cells), dtype=bool)
         touched[self._cell[rows]] = True
         return np.flatnonzero(touched).astype(np.int32)
@@ -233,7 +235,15 @@ def _chain(
 
 @njit(cache=True, nogil=True)
 def _add_hard(
-    rows: I64, labels: I32, fraction: F64, features: F32, cell: I32, mass: U32, place: I64, drift: F64
+    rows: I64,
+    labels: I32,
+    points: F64,
+    resolution: float,
+    features: F32,
+    cell: I32,
+    mass: U32,
+    place: I64,
+    drift: F64,
 ) -> None:
     for i in range(len(rows)):
         r, total = rows[i], np.int64(0)
@@ -241,12 +251,20 @@ def _add_hard(
             total += np.int64(mass[r, c])
         drift[cell[r]] += (1.5 - mass[r, labels[i]] / total) * MASS_UNIT / (total + MASS_UNIT) if total else 1.0
         mass[r, labels[i]] += np.uint32(MASS_UNIT)
-        _add_place(r, MASS_UNIT, fraction[i], features[i], place)
+        _add_place(r, MASS_UNIT, points[i], resolution, features[i], place)
 
 
 @njit(cache=True, nogil=True)
 def _add_soft(
-    rows: I64, weights: F32, fraction: F64, features: F32, cell: I32, mass: U32, place: I64, drift: F64
+    rows: I64,
+    weights: F32,
+    points: F64,
+    resolution: float,
+    features: F32,
+    cell: I32,
+    mass: U32,
+    place: I64,
+    drift: F64,
 ) -> None:
     for i in range(len(rows)):
         r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
@@ -262,12 +280,13 @@ def _add_soft(
         drift[cell[r]] += (
             (1.5 - agreed / (float(total) * float(added))) * added / (total + added) if total else 1.0
         )
-        _add_place(r, added, fraction[i], features[i], place)
+        _add_place(r, added, points[i], resolution, features[i], place)
 
 
 @njit(cache=True, nogil=True)
-def _add_place(row: np.int64, w: int | np.int64, fraction: F64, features: F32, place: I64) -> None:
+def _add_place(row: np.int64, w: int | np.int64, point: F64, resolution: float, features: F32, place: I64) -> None:
     for d in range(3):
-        place[row, d] += w * int(np.rint(fraction[d] * PLACE_UNIT))
+        v = point[d] / resolution
+        place[row, d] += w * int(np.rint((v - np.floor(v)) * PLACE_UNIT))
     for f in range(len(features)):
         place[row, 3 + f] += w * int(np.rint(features[f] * FEATURE_UNIT))

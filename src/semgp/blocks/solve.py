@@ -19,7 +19,7 @@ from numba import njit
 from semgp.blocks.arrays import F32, I8, I16, I32, I64
 from semgp.blocks.covariance import Mixture, covariance_lower
 from semgp.blocks.layout import Layout
-from semgp.blocks.linear import inverse_factor
+from semgp.blocks.linear import inverse_factor, pack, packed_size
 from semgp.blocks.members import Members, Sizes, gather
 from semgp.blocks.tree import split
 
@@ -42,8 +42,8 @@ class Solved(NamedTuple):
 
     n (B,): members. X (B, D, total), k (B, total): their positions, and the sites that they join. n_present (B,),
     present (B, C): the classes with mass in the block. at (B + 1,), coefficients: where in the flat array each
-    block's (3 + 3 P, n) coefficients begin. at_factor (B + 1,), factor: the same for the inverse Cholesky factors
-    (n, n).
+    block's (3 + 3 P, n) coefficients begin. at_factor (B + 1,), factor: the same for the inverse Cholesky factors,
+    lower triangles row by row.
     """
 
     n: I32
@@ -70,6 +70,7 @@ def solve_cells(
     tree_at: I64,
     axes: I8,
     cuts: F32,
+    factor: F32,
 ) -> Solved:
     """Split cells into blocks and solve each.
 
@@ -89,6 +90,8 @@ def solve_cells(
         Leaves of each cell's tree, and where it begins in `axes` and `cuts`.
     axes, cuts : arrays
         The trees' planes, filled in.
+    factor : array
+        Room for the blocks' factors.
     """
     T, D, C = sizes.total, layout.X.shape[1], layout.mass.shape[1]
     B = leaves.sum()
@@ -101,12 +104,12 @@ def solve_cells(
         np.zeros(B + 1, np.int64),
         np.empty(B * T * (SHARED + 3 * min(C, 6)), np.float32),
         np.zeros(B + 1, np.int64),
-        np.empty(B * T * T if noise.solve else 0, np.float32),
+        factor,
     )
     coefficients = solved.coefficients
     marks = np.full(len(layout.row), -1, np.int32)
     members = Members(np.empty((D, T), np.float32), np.empty((T, C), np.float32), np.empty(T, np.float32))
-    K, work = np.empty(T * T, np.float32), np.empty(T, np.float32)
+    K, work, inverse = np.empty(T * T, np.float32), np.empty(T, np.float32), np.empty(T * T, np.float32)
     b = -1
     for i in range(len(places)):
         cell, n_leaves = places[i], leaves[i]
@@ -127,7 +130,7 @@ def solve_cells(
             solved.n[b], solved.n_present[b] = n, P
             solved.X[b, :, :n], solved.k[b, :n] = members.X[:, :n], members.k[:n]
             solved.at[b + 1] = solved.at[b] + W * n
-            solved.at_factor[b + 1] = solved.at_factor[b] + (n * n if noise.solve else 0)
+            solved.at_factor[b + 1] = solved.at_factor[b] + (packed_size(n) if noise.solve else 0)
             rows = coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n)
             for j in range(n):
                 rows[2 + 2 * P, j] = 0
@@ -135,8 +138,11 @@ def solve_cells(
                     rows[3 + 2 * P + p, j] = members.mass[j, solved.present[b, p]]
                     rows[2 + 2 * P, j] += rows[3 + 2 * P + p, j]
             if noise.solve and n:
-                factor = solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]].reshape(n, n)
-                solve_block(members.X, members.k, n, solved.present[b, :P], kernel, noise, rows, factor, K, work)
+                L_inverse = inverse[: n * n].reshape(n, n)
+                solve_block(
+                    members.X, members.k, n, solved.present[b, :P], kernel, noise, rows, L_inverse, K, work
+                )
+                pack(L_inverse, solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]])
     return Solved(
         solved.n,
         solved.X,
@@ -146,7 +152,7 @@ def solve_cells(
         solved.at,
         coefficients[: solved.at[B]],
         solved.at_factor,
-        solved.factor[: solved.at_factor[B]],
+        solved.factor,
     )
 
 

@@ -36,6 +36,9 @@ class Piece:
     experts: dict[int, BlockExpert] = field(default_factory=dict)
 
 
+_MOST_SPARE = 64  # arrays of dropped pieces that are kept for the next ones
+
+
 class BlockStore:
     """The blocks of the cells, by cell number.
 
@@ -46,6 +49,7 @@ class BlockStore:
         self.stale = np.empty(0, dtype=bool)
         self.pieces: dict[int, Piece] = {}
         self.next_block = 0
+        self._spare: list[F32] = []
         self._block, self._tree_at = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         self._leaves, self._piece = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         self._axes, self._cuts = np.empty(0, dtype=np.int8), np.empty(0, dtype=np.float32)
@@ -92,15 +96,17 @@ class BlockStore:
         """Return what compiled code needs to find the blocks of points."""
         return CellTrees(cells.slots, cells.keys, self._block, self._leaves, self._tree_at, self._axes, self._cuts)
 
-    def jobs(self, block: I64, order: I64, size: int) -> Iterator[tuple[Piece | None, I64]]:
-        """Split pairs, of ascending blocks (n,), by piece (None: no block) and to at most `size` of them."""
+    def by_piece(self, block: I64) -> Iterator[tuple[Piece | None, I64]]:
+        """Sort pairs of these blocks (n,) by block, and split them by piece; None where there is no block."""
+        order = sorted_by(block)
+        block = block[order]
         firsts = np.array(sorted(self.pieces), dtype=np.int64)
         edges = np.searchsorted(block, np.append(firsts, self.next_block))
         if edges[0] > 0:
             yield None, order[: edges[0]]
         for first, a, b in zip(firsts, edges[:-1], edges[1:]):
-            for start in range(a, b, size):
-                yield self.pieces[int(first)], order[start : min(start + size, b)]
+            if b > a:
+                yield self.pieces[int(first)], order[a:b]
 
     def piece_of(self, block: int) -> Piece:
         """Return the piece that holds a block."""
@@ -117,11 +123,19 @@ class BlockStore:
         solved = sum(a.nbytes for piece in self.pieces.values() for a in piece.solved)
         return solved + self._axes.nbytes + self._cuts.nbytes
 
+    def room(self, n: int) -> F32:
+        """Return an array of n numbers, of any value, from a piece that was dropped where there is one.
+
+        Fresh memory takes longer to touch than a factor to compute.
+        """
+        fits = [i for i, spare in enumerate(self._spare) if n <= len(spare) <= 2 * n]
+        return self._spare.pop(fits[0]) if fits else np.empty(n, dtype=np.float32)
+
     def _release(self, first: int) -> None:
         if first >= 0:
             self.pieces[first].cells -= 1
             if self.pieces[first].cells == 0:
-                del self.pieces[first]
+                self._spare = [*self._spare[-_MOST_SPARE:], self.pieces.pop(first).solved.factor]
 
     def _compact_trees(self, dropped: I32) -> None:
         """Rewrite the trees without those of `dropped` cells once more than half of them are of no use."""
@@ -136,3 +150,13 @@ class BlockStore:
         source = np.repeat(self._tree_at[cells] - starts, sizes) + np.arange(total)
         self._axes, self._cuts = self._axes[source], self._cuts[source]
         self._tree_at[cells] = starts
+
+
+def sorted_by(number: I64) -> I64:
+    """Return the stable order of numbers (n,), sixteen bits at a time: numpy sorts those by radix."""
+    left = number - number.min(initial=0)
+    order = np.argsort((left & 0xFFFF).astype(np.uint16), kind="stable")
+    while left.max(initial=0) > 0xFFFF:
+        left >>= 16
+        order = order[np.argsort((left[order] & 0xFFFF).astype(np.uint16), kind="stable")]
+    return order

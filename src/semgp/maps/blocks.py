@@ -71,7 +71,7 @@ class ManyBlocks:
         # one covariance for all classes has one variance for all of them
         variance = np.broadcast_to(answers.variance[:, None], answers.probability.shape)
         observed = answers.variance < UNEXPLAINED * self._field.prior_variance
-        return Prediction(self.classes, answers.probability, observed, answers.mean, variance)
+        return Prediction(self.classes, answers.probability, observed, variance=variance)
 
     def solve(self) -> None:
         """Solve the blocks that are not up to date, but for the tolerance."""
