@@ -49,7 +49,7 @@ def answer_pairs(
     order : (n,) array
         The pairs to answer, by block.
     features : (M, F) array
-        The points' inputs beyond position; a row of NaN takes the features of the block's nearest member.
+        The points' inputs beyond position; where NaN, that of the block's nearest member.
     kernel : Mixture
         The covariance function.
     link : Link
@@ -106,15 +106,22 @@ def answer_pairs(
 
 
 @njit(cache=True, nogil=True)
-def answer_prior(pairs: Pairs, order: I64, prior_variance: float, link: Link, answers: Answers) -> None:
-    """Add the prior for pairs without a block."""
-    C = answers.probability.shape[1]
-    known = link.prior[:C] / link.prior[:C].sum()
+def answer_prior(pairs: Pairs, order: I64, prior_variance: float, probability: F32, answers: Answers) -> None:
+    """Add what is known without data, `probability` (C,), for pairs without a block."""
     for i in order:
         point, w = pairs.point[i], pairs.weight[i]
-        for c in range(answers.probability.shape[1]):
-            answers.probability[point, c] += w * known[c]
+        for c in range(len(probability)):
+            answers.probability[point, c] += w * probability[c]
         answers.variance[point] += w * np.float32(prior_variance)
+
+
+def prior_probabilities(link: Link, n_classes: int) -> F32:
+    """Return the probabilities (C,) far from all data: what every block's answer tends to."""
+    p, u, nothing = np.empty((1, 1), np.float32), np.zeros(1, np.float32), np.empty(0, np.int16)
+    class_probabilities(np.zeros((SHARED, 1), np.float32), nothing, 1, link, p)
+    if link.other or link.error_rate > 0:
+        error_shares(p, nothing, 1, link, u)
+    return np.asarray(p[0, 0] * link.power[:n_classes] + u[0] * link.errors, dtype=np.float32)
 
 
 @njit(cache=True, nogil=True)

@@ -8,8 +8,8 @@ from numba import njit
 _LOG_2, _INVERSE_LOG_2, _ROOT_2 = np.float32(np.log(2)), np.float32(1 / np.log(2)), np.float32(np.sqrt(2))
 _LOWEST, _TINY = np.float32(-126), np.float32(1.2e-38)
 # 2^f = sum_k (f log 2)^k / k! for 0 <= f < 1
-_E0, _E1, _E2, _E3, _E4, _E5, _E6, _E7 = (
-    np.float32(np.log(2) ** k / np.prod(np.arange(1.0, k + 1))) for k in range(8)
+_E0, _E1, _E2, _E3, _E4, _E5, _E6, _E7, _E8 = (
+    np.float32(np.log(2) ** k / np.prod(np.arange(1.0, k + 1))) for k in range(9)
 )
 # log m = 2 atanh(s) = 2 s sum_k s^(2 k) / (2 k + 1), s = (m - 1) / (m + 1)
 _L0, _L1, _L2, _L3, _L4 = (np.float32(2 / (2 * k + 1)) for k in range(5))
@@ -18,11 +18,12 @@ _HALF, _ONE = np.float32(0.5), np.float32(1)
 
 @njit(cache=True, nogil=True, fastmath=True, inline="always")
 def exp_minus(t: np.float32) -> np.float32:
-    """exp(-t) for t >= 0, to 1e-7 absolute: a power of two from the exponent's bits, times a polynomial."""
+    """exp(-t) for t >= 0, to 2e-7 absolute: a power of two from the exponent's bits, times a polynomial."""
     y = max(-t * _INVERSE_LOG_2, _LOWEST)
     n = np.floor(y)
     f = y - n
-    p = _E6 + f * _E7
+    p = _E7 + f * _E8
+    p = _E6 + f * p
     p = _E5 + f * p
     p = _E4 + f * p
     p = _E3 + f * p

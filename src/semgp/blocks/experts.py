@@ -1,6 +1,6 @@
 """Posteriors that each block solves by itself: Dirichlet targets, and the paper's Laplace, EP and softmax.
 
-They see the same members as the closed form, and share its blocks, blending and prior.
+They see the same members as the closed form, and share its blocks and blending.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ def solve_expert(model: BlockModel, X: Array, mass: Array, k: Array, prior: Arra
 class DirichletExpert:
     """Regression on the logarithms of Dirichlet variables, class by class.
 
-    A member with mass n_c has alpha_c = n_c + a pi_c, and log-normal moments sigma_c^2 = log(1 + 1 / alpha_c) and
-    y_c = log alpha_c - sigma_c^2 / 2; p_c is proportional to exp of the latent mean. Classes without mass in the
-    block share one regression up to their prior. Source: Milios et al. (2018), "Dirichlet-based Gaussian Processes
-    for Large-scale Calibrated Classification", eq. 6.
+    A member with mass n_c, over the number of sites that it joins, has alpha_c = n_c + a pi_c, and log-normal
+    moments sigma_c^2 = log(1 + 1 / alpha_c) and y_c = log alpha_c - sigma_c^2 / 2. p_c is proportional to exp of the
+    latent mean, which far from data, and for classes without mass in the block, is that of a point without labels.
+    Source: Milios et al. (2018), "Dirichlet-based Gaussian Processes for Large-scale Calibrated Classification",
+    eq. 6.
     """
 
     def __init__(self, model: BlockModel, X: Array, mass: Array, k: Array, prior: Array) -> None:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from semgp.blocks.answer import Answers, answer_pairs, answer_prior
+from semgp.blocks.answer import Answers, answer_pairs, answer_prior, prior_probabilities
 from semgp.blocks.arrays import F32, F64, I32, I64
 from semgp.blocks.covariance import mixture
 from semgp.blocks.expert_answer import answer_by_experts
@@ -41,6 +41,7 @@ class Field:
         self.store = BlockStore()
         self._kernel = mixture(model.kernel, model.n_dims)
         self._noise, self._link = model.noise(n_classes), model.link(n_classes)
+        self._unknown = prior_probabilities(self._link, n_classes)
         self.prior_variance = float(self._kernel.variance.sum())
 
     def add(self, points: F64, labels: I32 | None, weights: F32 | None, features: F32) -> None:
@@ -49,7 +50,7 @@ class Field:
         Raises
         ------
         InputError
-            Points a million voxels from the first.
+            Points a million voxels from the first, or weights or features beyond what a site can hold.
         """
         touched = self.sites.add(points, labels, weights, features)
         self.touch(touched)
@@ -70,7 +71,7 @@ class Field:
         cells = np.arange(len(sites.cells), dtype=np.int32) if cells is None else cells
         todo = cells[store.stale[cells]]
         if tolerance > 0:
-            moved = sites.drift[todo] > tolerance * sites.size[todo]
+            moved = (sites.drift[todo] > tolerance * sites.size[todo]) | (sites.size[todo] == 0)
             todo = todo[moved | ~store.is_solved(todo)]
         if not len(todo):
             return 0
@@ -113,7 +114,7 @@ class Field:
             pairs = find_pairs(points, chosen, self.sites.resolution, origin, half, trees)
             for piece, order in self.store.by_piece(pairs.block):
                 if piece is None:
-                    answer_prior(pairs, order, self.prior_variance, self._link, answers)
+                    answer_prior(pairs, order, self.prior_variance, self._unknown, answers)
                 elif self.model.posterior in EXPERTS:
                     answer_by_experts(self.model, piece, pairs, order, features, self._link.prior, answers)
                 else:

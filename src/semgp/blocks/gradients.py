@@ -1,7 +1,7 @@
 """Held-out log-loss of patches and its gradient in all parameters of the model, by the chain rule backwards.
 
 With F = Y A^-1 K_*, G = dL/dF, B = A^-1 K_* and H = (Y A^-1)^T G, the gradients are dL/dK_* = H, dL/dA = -H B^T
-and dL/dY = G B^T.
+and dL/dY = G B^T. The vote's rows of F are Y K_* itself: they add to dL/dK_* alone.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, li
         derivative_tile(X, n, Y, m, kernel, H, 1.0, out.kernel, work)
         if noise.solve:
             B = np.dot(L_inverse.T, np.dot(L_inverse, cross))
-            S = np.dot(H, np.ascontiguousarray(B.T))  # minus dL/dA
+            # minus dL/dA: the votes, in the last rows, do not depend on A
+            H_solved = np.dot(np.ascontiguousarray(rows[: 2 + 2 * P].T), G[: 2 + 2 * P])
+            S = np.dot(H_solved, np.ascontiguousarray(B.T))
             derivative_tile(X, n, X, n, kernel, S, -1.0, out.kernel, work)
             G_rows = np.dot(G, np.ascontiguousarray(B.T))
             _noise_gradient(S, G_rows, rows, k, present, noise, out.noise)

@@ -168,6 +168,8 @@ class _Search:
     def __call__(
         self, trials: Sequence[Trial], start: BlockModel, free: F64, max_iterations: int, spread: float
     ) -> tuple[BlockModel, LearnedBlocks]:
+        if not trials or not all(training and judges for training, judges in trials):
+            raise InputError("a trial needs clouds that give labels and clouds that judge them.")
         if start.prior is None:
             start = replace(start, prior=class_frequencies([c for training, _ in trials for c in training]))
         drawn = []

@@ -14,8 +14,8 @@ _PANEL = 32  # rows that plain loops factor; everything else is matrix products
 def inverse_factor(A: F32, out: F32) -> None:
     """Fill `out` (n, n) with the inverse of the Cholesky factor of A (n, n); zeros above the diagonal.
 
-    Reads the lower triangle of A only, and overwrites it with the factor L. A must be positive definite, as the
-    nugget sees to. Panel by panel, with D = L_kk^-1: L_ik = A_ik D^T, A_ij -= L_ik L_jk^T below and to the right,
+    Reads the lower triangle of A only, and overwrites it with the factor L. A must be positive definite, as its
+    noise sees to. Panel by panel, with D = L_kk^-1: L_ik = A_ik D^T, A_ij -= L_ik L_jk^T below and to the right,
     and row k of L^-1 is D [-L_k0 ... L_k,k-1, I] [L^-1 of the rows above].
     """
     n = len(A)

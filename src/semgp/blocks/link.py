@@ -81,8 +81,9 @@ def class_probabilities(F: F32, present: I16, m: int, link: Link, p: F32) -> Non
             counted = np.float32(1) if c < P else np.float32(0)
             for q in range(m):
                 row[q] += w_v * log(counted * votes[q] + v_0 * pi)
-        for q in range(m):
-            peak[q] = max(peak[q], row[q])
+        if c < P or len(prior) > P:
+            for q in range(m):
+                peak[q] = max(peak[q], row[q])
     rest = np.float32(0)
     is_present = np.zeros(len(prior), np.bool_)
     for c in present:
@@ -94,7 +95,7 @@ def class_probabilities(F: F32, present: I16, m: int, link: Link, p: F32) -> Non
     for c in range(P + 1):
         share = np.float32(1) if c < P else rest
         for q in range(m):
-            p[c, q] = exp_minus(peak[q] - p[c, q])
+            p[c, q] = exp_minus(max(peak[q] - p[c, q], np.float32(0)))
             total[q] += share * p[c, q]
     for c in range(P + 1):
         for q in range(m):

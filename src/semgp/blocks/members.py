@@ -9,7 +9,7 @@ from numba import njit
 
 from semgp.blocks.arrays import F32, I32, I64
 from semgp.blocks.layout import Layout
-from semgp.blocks.tree import _select
+from semgp.blocks.tree import select
 
 
 class Sizes(NamedTuple):
@@ -91,12 +91,12 @@ def gather(
                     _add_site(layout, s, dx, dy, dz, marks, mark, n, out)
                     n += 1
             near_left -= free
+        elif far_left == 0:
+            break
         else:
             _add_coarse(layout, b, e, dx, dy, dz, marks, mark, n, out)
             n += 1
             far_left -= 1
-            if far_left == 0:
-                break
     return n
 
 
@@ -141,7 +141,7 @@ def _nearest(layout: Layout, around: I32, low: F32, high: F32, edge: float, want
         reach *= 2
     order = np.arange(n)
     if n > wanted:
-        _select(distance, order, 0, n, wanted, 0)
+        select(distance, order, 0, n, wanted, 0)
         order = order[:wanted]
     ranked = np.argsort(distance[order, 0], kind="mergesort")
     return voxels, cells, order[ranked]

@@ -107,8 +107,8 @@ class BlockModel:
             raise InputError(f"posterior must be one of {', '.join((*CLOSED, *EXPERTS))}, not {self.posterior!r}.")
         for name in _POSITIVE:
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} must be positive and finite, not {value}.")
+            if not (isinstance(value, int | float | np.number) and math.isfinite(value) and value > 0):
+                raise InputError(f"{name} must be a number, positive and finite, not {value!r}.")
             object.__setattr__(self, name, float(value))
         weights = CLOSED.get(self.posterior, (0.0, 0.0, 1.0)) if self.weights is None else self.weights
         powers = tuple(float(w) for w in weights)
@@ -126,14 +126,19 @@ class BlockModel:
             raise InputError("error_rate must be 0 or above, error_power above 0, both finite.")
         if self.posterior in EXPERTS and (self.other or self.error_rate > 0):
             raise InputError(f"a {self.posterior} model knows no other mass and no error rate.")
+        if isinstance(self.features, str):
+            raise InputError(f"features must be a tuple of names, such as ({self.features!r},).")
         object.__setattr__(self, "features", tuple(self.features))
+        if not all(isinstance(v, int) for v in (self.leaf, self.near, self.far)):
+            raise InputError("leaf, near and far are numbers of members: whole numbers.")
         if self.leaf < 2 or self.near < 0 or self.far < 0 or self.members > _MOST_MEMBERS:
             raise InputError(f"a block needs 2 own sites at least and {_MOST_MEMBERS} members at most.")
         if not 0 < self.blend <= 8:
             raise InputError(f"blend must be above 0 and at most 8 voxels, not {self.blend}.")
         for term in self.terms:
-            if term.dims is None and len(term.ell) not in (1, self.n_dims):
-                raise InputError(f"{len(term.ell)} length scales do not fit {self.n_dims} inputs.")
+            dims = range(self.n_dims) if term.dims is None else term.dims
+            if not dims or not all(0 <= d < self.n_dims for d in dims) or len(term.ell) not in (1, len(dims)):
+                raise InputError(f"length scales {term.ell} of dimensions {dims} do not fit {self.n_dims} inputs.")
 
     @property
     def n_dims(self) -> int:
@@ -210,6 +215,9 @@ class BlockModel:
         InputError
             Fields that are missing, unknown or of the wrong kind.
         """
+        missing = cls.__dataclass_fields__.keys() - plain.keys()
+        if missing:
+            raise InputError(f"this is no block model: it lacks {', '.join(sorted(missing))}.")
         try:
             lists = {n: tuple(plain[n]) for n in ("weights", "features")}
             maybe = {n: None if plain[n] is None else tuple(plain[n]) for n in ("prior", "errors")}

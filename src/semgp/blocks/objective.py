@@ -90,15 +90,17 @@ class Objective:
 
 
 def all_free(model: BlockModel, vertical: int | None) -> F64:
-    """Return the matrix that frees all parameters that matter, with equal horizontal length scales if `vertical`.
+    """Return the matrix that frees all parameters in use; length scales across a `vertical` axis are equal.
 
     Raises
     ------
     InputError
-        A posterior that is not in closed form.
+        A posterior that is not in closed form, or an axis that is none.
     """
     if model.posterior not in CLOSED:
         raise InputError(f"a {model.posterior} model is not learned by trials: learn one of {', '.join(CLOSED)}.")
+    if vertical not in (None, 0, 1, 2):
+        raise InputError(f"the vertical is axis 0, 1 or 2, or None, not {vertical}.")
     n_theta = len(model.kernel.theta)
     groups = _tied(model, vertical)
     w_i, w_l, w_v = model.powers

@@ -31,6 +31,12 @@ CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
 
 
+_FULL = 1 << 31
+"""Mass of a site, half a million labels, beyond which labels change nothing and are not added: sums never wrap."""
+
+_LARGEST_WEIGHT, _LARGEST_FEATURE = 64, 30_000
+
+
 class Sites:
     """Class mass, position and features of each voxel with labels, and the cells that the voxels lie in.
 
@@ -123,19 +129,25 @@ class Sites:
         Raises
         ------
         InputError
-            Points a million voxels from the first, or weights beyond what a sum can hold.
+            Points a million voxels from the first, or weights or features beyond what a sum can hold.
         """
         if not len(points):
             return np.empty(0, dtype=np.int32)
-        if self.origin is None:
-            self.origin = voxel_origin(points, self.resolution) >> CELL_BITS << CELL_BITS
-        if weights is not None and weights.max() > 1024:
-            raise InputError("weights of soft labels must not be beyond 1024: divide them, or use probabilities.")
+        if weights is not None and weights.max() > _LARGEST_WEIGHT:
+            raise InputError(f"weights of soft labels must be {_LARGEST_WEIGHT} at most: divide them.")
+        if np.abs(features).max(initial=0) > _LARGEST_FEATURE:
+            raise InputError(f"features must lie within {_LARGEST_FEATURE} of 0: scale them.")
         if weights is not None:
             heavy = np.rint(weights * MASS_UNIT).sum(axis=1) > 0
             points, weights, features = points[heavy], weights[heavy], features[heavy]
-        known = len(self)
-        rows = self.voxels.insert(voxel_keys(points, self.resolution, self.origin))
+            if not len(points):
+                return np.empty(0, dtype=np.int32)
+        origin = self.origin
+        if origin is None:
+            origin = voxel_origin(points, self.resolution) >> CELL_BITS << CELL_BITS
+        keys = voxel_keys(points, self.resolution, origin)
+        self.origin, known = origin, len(self)
+        rows = self.voxels.insert(keys)
         self._grow()
         self._link(known)
         if labels is not None:
@@ -186,13 +198,19 @@ class Sites:
         Raises
         ------
         InputError
-            Keys that occur twice or sites without mass.
+            Keys out of range or twice, sites without mass or beyond their voxel, an origin within a cell.
         """
         keys = arrays["voxels"]
         if not len(keys):
             return
-        if (keys < 0).any() or not (arrays["mass"] > 0).any(axis=1).all():
-            raise InputError("the stored sites are damaged: a voxel out of range, or one without mass.")
+        total = arrays["mass"].sum(axis=1, dtype=np.int64)
+        inside = arrays["place"][:, :3] <= total[:, None] * PLACE_UNIT
+        if (keys < 0).any() or not ((total > 0).all() and inside.all() and (arrays["place"][:, :3] >= 0).all()):
+            raise InputError(
+                "the stored sites are damaged: a voxel out of range, without mass, or left by its site."
+            )
+        if (arrays["origin"] % CELL).any():
+            raise InputError("the stored sites are damaged: their origin is no corner of a cell.")
         self.origin = arrays["origin"]
         self.voxels.insert(keys)
         if len(self) != len(keys):
@@ -249,6 +267,8 @@ def _add_hard(
         r, total = rows[i], np.int64(0)
         for c in range(mass.shape[1]):
             total += np.int64(mass[r, c])
+        if total > _FULL:
+            continue
         drift[cell[r]] += (1.5 - mass[r, labels[i]] / total) * MASS_UNIT / (total + MASS_UNIT) if total else 1.0
         mass[r, labels[i]] += np.uint32(MASS_UNIT)
         _add_place(r, MASS_UNIT, points[i], resolution, features[i], place)
@@ -269,11 +289,14 @@ def _add_soft(
     for i in range(len(rows)):
         r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
         for c in range(mass.shape[1]):
+            total += np.int64(mass[r, c])
+        if total > _FULL:
+            continue
+        for c in range(mass.shape[1]):
             # what the classes lack to one is the mass of the last column, where there is one more than classes
             w = np.int64(max(MASS_UNIT - int(added), 0))
             if c < weights.shape[1]:
                 w = np.int64(np.rint(weights[i, c] * MASS_UNIT))
-            total += np.int64(mass[r, c])
             added += w
             agreed += float(w) * float(mass[r, c])
             mass[r, c] += np.uint32(w)

@@ -27,6 +27,10 @@ SHARED = 3
 """Rows of coefficients that do not belong to one class: absent indicator, absent log-ratio, vote of all mass."""
 
 
+JITTER = 3e-5
+"""Noise added to every member, times the prior variance: single precision factors nothing closer to singular."""
+
+
 class Noise(NamedTuple):
     """What targets and noise depend on: s_n, nugget, a, the prior pi (C,), and whether to solve at all."""
 
@@ -143,6 +147,8 @@ def solve_cells(
                     members.X, members.k, n, solved.present[b, :P], kernel, noise, rows, L_inverse, K, work
                 )
                 pack(L_inverse, solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]])
+            else:
+                rows[: 2 + 2 * P] = 0
     return Solved(
         solved.n,
         solved.X,
@@ -204,9 +210,10 @@ def solve_block(
     P = len(present)
     _targets(rows, n, present, noise)
     A = K_flat[: n * n].reshape(n, n)
+    jitter = np.float32(JITTER) * kernel.variance.sum()
     covariance_lower(X, n, kernel, A, work)
     for j in range(n):
-        A[j, j] += np.float32(noise.s_n) / rows[2 + 2 * P, j] + np.float32(noise.nugget) / k[j]
+        A[j, j] += np.float32(noise.s_n) / rows[2 + 2 * P, j] + np.float32(noise.nugget) / k[j] + jitter
     inverse_factor(A, factor)
     targets = rows[: 2 + 2 * P]
     targets[:, :] = np.dot(np.dot(targets, factor.T), factor)

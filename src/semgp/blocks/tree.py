@@ -12,8 +12,6 @@ from numba import njit
 
 from semgp.blocks.arrays import F32, I8, I64
 
-Int = I64
-
 
 @njit(cache=True, nogil=True)
 def split(X: F32, order: I64, n_leaves: int, axes: I8, cuts: F32, bounds: I64) -> None:
@@ -37,7 +35,7 @@ def split(X: F32, order: I64, n_leaves: int, axes: I8, cuts: F32, bounds: I64) -
         a, b = bounds[first], bounds[last]
         middle = a + (b - a) * (half - first) // (last - first)
         axis = _widest(X, order, a, b)
-        _select(X, order, a, b, middle, axis)
+        select(X, order, a, b, middle, axis)
         below = X[order[a], axis]
         for i in range(a, middle):
             below = max(below, X[order[i], axis])
@@ -49,7 +47,7 @@ def split(X: F32, order: I64, n_leaves: int, axes: I8, cuts: F32, bounds: I64) -
 
 
 @njit(cache=True, nogil=True)
-def _widest(X: F32, order: Int, a: int, b: int) -> int:
+def _widest(X: F32, order: I64, a: int, b: int) -> int:
     best, widest = 0, np.float32(-1)
     for axis in range(3):
         low = high = X[order[a], axis]
@@ -62,7 +60,7 @@ def _widest(X: F32, order: Int, a: int, b: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _select(X: F32, order: Int, a: int, b: int, k: int, axis: int) -> None:
+def select(X: F32, order: I64, a: int, b: int, k: int, axis: int) -> None:
     """Bring the site that belongs to place k of order[a:b], by coordinate and then index, to its place."""
     low, high = a, b - 1
     while low < high:
