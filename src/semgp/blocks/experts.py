@@ -35,10 +35,10 @@ class DirichletExpert:
     """Regression on the logarithms of Dirichlet variables, class by class.
 
     A member with mass n_c, over the number of sites that it joins, has alpha_c = n_c + a pi_c, and log-normal
-    moments sigma_c^2 = log(1 + 1 / alpha_c) and y_c = log alpha_c - sigma_c^2 / 2. p_c is proportional to exp of the
-    latent mean, which far from data, and for classes without mass in the block, is that of a point without labels.
-    Source: Milios et al. (2018), "Dirichlet-based Gaussian Processes for Large-scale Calibrated Classification",
-    eq. 6.
+    moments sigma_c^2 = log(1 + 1 / alpha_c) and y_c = log alpha_c - sigma_c^2 / 2. p_c is proportional to exp of
+    the latent mean, which far from data, and for classes without mass in the block, is that of a point without
+    labels. Source: Milios et al. (2018), "Dirichlet-based Gaussian Processes for Large-scale Calibrated
+    Classification", eq. 6.
     """
 
     def __init__(self, model: BlockModel, X: Array, mass: Array, k: Array, prior: Array) -> None:

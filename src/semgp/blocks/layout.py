@@ -27,8 +27,8 @@ class Layout(NamedTuple):
     cells (L,): ids. start (L + 1,): where each cell's sites begin. row (S,): index of each site in `Sites`.
     X (S, D): position in metres from the cell's lowest corner, and features. first (S + L,): where each coarse
     voxel's sites begin, and the last one's end, from `start[i] + i` on for cell i. n_coarse (L,): coarse voxels of
-    each cell. centre (S, D): mean of the sites of each coarse voxel, from `start[i]` on. mass (sites, C): class mass
-    of all sites of the map, in steps of `unit`.
+    each cell. centre (S, D): mean of the sites of each coarse voxel, from `start[i]` on. mass (sites, C): class
+    mass of all sites of the map, in steps of `unit`.
     """
 
     cells: I32
