@@ -28,9 +28,9 @@ class Answers(NamedTuple):
 @njit(cache=True, nogil=True)
 def answer_pairs(
     solved: Solved,
-    first_block: int,
     pairs: Pairs,
     order: I64,
+    block: I64,
     features: F32,
     kernel: Mixture,
     link: Link,
@@ -41,13 +41,13 @@ def answer_pairs(
     Parameters
     ----------
     solved : Solved
-        Posteriors; its first block has the number `first_block`.
-    first_block : int
-        See `solved`.
+        Posteriors.
     pairs : Pairs
         All pairs.
     order : (n,) array
         The pairs to answer, by block.
+    block : (n,) array
+        The place of the block of each in `solved`.
     features : (M, F) array
         The points' inputs beyond position; where NaN, that of the block's nearest member.
     kernel : Mixture
@@ -70,11 +70,11 @@ def answer_pairs(
     unpacked = -1
     begin = 0
     while begin < len(order):
-        number = pairs.block[order[begin]]
+        b = block[begin]
         end = begin + 1
-        while end < len(order) and end - begin < TILE and pairs.block[order[end]] == number:
+        while end < len(order) and end - begin < TILE and block[end] == b:
             end += 1
-        m, b = end - begin, number - first_block
+        m = end - begin
         n, P = solved.n[b], solved.n_present[b]
         W = SHARED + 3 * P
         Z = solved.X[b]

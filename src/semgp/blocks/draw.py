@@ -46,13 +46,14 @@ def draw_patches(
     block, local = field.home(points[shuffled])
     order = np.argsort(block, kind="stable")
     ranked = block[order]
+    wanted = np.unique(drawn[drawn >= 0])
     patches = []
-    for b in np.unique(drawn[drawn >= 0]):
-        begin, end = np.searchsorted(ranked, [b, b + 1])
-        here = order[begin : min(end, begin + HELD_OUT)]
-        piece = field.store.piece_of(int(b))
-        if len(here) and piece.solved.n[b - piece.first]:
-            rows = shuffled[here]
-            Y = np.concatenate([local[here], features[rows]], axis=1)
-            patches.append(patch(piece.solved, int(b - piece.first), Y, labels[rows]))
+    for piece, which, inside in field.store.by_piece(wanted):
+        for b, place in zip(wanted[which], inside):
+            begin, end = np.searchsorted(ranked, [b, b + 1])
+            here = order[begin : min(end, begin + HELD_OUT)]
+            if piece is not None and len(here) and piece.solved.n[place]:
+                rows = shuffled[here]
+                Y = np.concatenate([local[here], features[rows]], axis=1)
+                patches.append(patch(piece.solved, int(place), Y, labels[rows]))
     return patches

@@ -20,15 +20,15 @@ def answer_by_experts(
     piece: Piece,
     pairs: Pairs,
     order: I64,
+    block: I64,
     features: F32,
     prior: F32,
     answers: Answers,
 ) -> None:
     """Add the answers to some pairs, sorted by block, all of blocks in one piece."""
-    block = pairs.block[order]
     edges = np.flatnonzero(np.diff(block, prepend=-1, append=-1))
     for a, b in pairwise(edges):
-        number = int(block[a]) - piece.first
+        number = int(block[a])
         if number not in piece.experts:
             piece.experts[number] = _solved(model, piece, number, prior)
         rows = order[a:b]

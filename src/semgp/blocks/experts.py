@@ -72,7 +72,8 @@ class PaperExpert:
     def __init__(self, model: BlockModel, X: Array, mass: Array, prior: Array) -> None:
         self._present = np.flatnonzero(mass.sum(axis=0) > 0)
         self._prior, self._n = prior, mass.sum()
-        gp = GPModel(kernels=(model.kernel,), inference=model.posterior, n_inducing=None, m=(-1.0,))
+        inference = model.posterior if len(self._present) > 1 else "laplace"  # one class needs no softmax
+        gp = GPModel(kernels=(model.kernel,), inference=inference, n_inducing=None, m=(-1.0,))
         shares = mass[:, self._present] / mass.sum(axis=1, keepdims=True)
         self._expert = fit_expert(gp, self._present, X, shares)
 

@@ -112,15 +112,13 @@ class Field:
 
         def run(chosen: I64) -> None:
             pairs = find_pairs(points, chosen, self.sites.resolution, origin, half, trees)
-            for piece, order in self.store.by_piece(pairs.block):
+            for piece, order, block in self.store.by_piece(pairs.block):
                 if piece is None:
                     answer_prior(pairs, order, self.prior_variance, self._unknown, answers)
                 elif self.model.posterior in EXPERTS:
-                    answer_by_experts(self.model, piece, pairs, order, features, self._link.prior, answers)
+                    answer_by_experts(self.model, piece, pairs, order, block, features, self._link.prior, answers)
                 else:
-                    answer_pairs(
-                        piece.solved, piece.first, pairs, order, features, self._kernel, self._link, answers
-                    )
+                    answer_pairs(piece.solved, pairs, order, block, features, self._kernel, self._link, answers)
 
         # points of one block come together, and one thread answers each point
         order = sorted_by(self.home(points)[0])

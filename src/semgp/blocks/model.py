@@ -100,7 +100,7 @@ class BlockModel:
     leaf: int = 64
     near: int = 8
     far: int = 24
-    blend: float = 1.25
+    blend: float = 1.5
 
     def __post_init__(self) -> None:
         if self.posterior not in (*CLOSED, *EXPERTS):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +23,7 @@ class Piece:
     Parameters
     ----------
     first : int
-        Number of the first of the piece's blocks; the others follow.
+        The piece's name: how many blocks had been solved before.
     solved : Solved
         Their posteriors.
     cells : int
@@ -39,10 +41,23 @@ class Piece:
 _MOST_SPARE = 64  # arrays of dropped pieces that are kept for the next ones
 
 
-class BlockStore:
-    """The blocks of the cells, by cell number.
+class Numbers(NamedTuple):
+    """Blocks in the order of their cells' keys, whatever the order in which they were solved.
 
-    Numbers of blocks are given once: a cell that is solved again gets new ones.
+    start (n,): number of the first block of each solved cell, ascending. piece (n,): the piece it is in. inside
+    (n,): its place there.
+    """
+
+    start: I64
+    piece: I64
+    inside: I64
+
+
+class BlockStore:
+    """The blocks of the cells.
+
+    Blocks are numbered by place, from `trees` to the next `replace`: the order in which points are answered, and
+    with it the last bit, does not depend on the map's history.
     """
 
     def __init__(self) -> None:
@@ -50,6 +65,7 @@ class BlockStore:
         self.pieces: dict[int, Piece] = {}
         self.next_block = 0
         self._spare: list[F32] = []
+        self._numbers = Numbers(*(np.empty(0, dtype=np.int64) for _ in range(3)))
         self._block, self._tree_at = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         self._leaves, self._piece = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         self._axes, self._cuts = np.empty(0, dtype=np.int8), np.empty(0, dtype=np.float32)
@@ -93,24 +109,33 @@ class BlockStore:
         return np.asarray(self._block[cells] >= 0)
 
     def trees(self, cells: VoxelTable) -> CellTrees:
-        """Return what compiled code needs to find the blocks of points."""
-        return CellTrees(cells.slots, cells.keys, self._block, self._leaves, self._tree_at, self._axes, self._cuts)
+        """Number the blocks, and return what compiled code needs to find those of points."""
+        solved = np.flatnonzero(self._block >= 0)
+        solved = solved[np.argsort(cells.keys[solved])]
+        start = np.concatenate([[0], self._leaves[solved].cumsum()[:-1]]) if len(solved) else np.empty(0, np.int64)
+        piece = self._piece[solved]
+        self._numbers = Numbers(start.astype(np.int64), piece, self._block[solved] - piece)
+        number = np.full(len(self._block), -1)
+        number[solved] = start
+        return CellTrees(cells.slots, cells.keys, number, self._leaves, self._tree_at, self._axes, self._cuts)
 
-    def by_piece(self, block: I64) -> Iterator[tuple[Piece | None, I64]]:
-        """Sort pairs of these blocks (n,) by block, and split them by piece; None where there is no block."""
+    def by_piece(self, block: I64) -> Iterator[tuple[Piece | None, I64, I64]]:
+        """Sort pairs (n,) by the number of their block, and split them where another piece begins.
+
+        Yields the piece, None where there is no block; pairs; and the place of their blocks in the piece.
+        """
         order = sorted_by(block)
         block = block[order]
-        firsts = np.array(sorted(self.pieces), dtype=np.int64)
-        edges = np.searchsorted(block, np.append(firsts, self.next_block))
-        if edges[0] > 0:
-            yield None, order[: edges[0]]
-        for first, a, b in zip(firsts, edges[:-1], edges[1:]):
+        unknown = int(np.searchsorted(block, 0))
+        if unknown > 0:
+            yield None, order[:unknown], block[:unknown]
+        order, block = order[unknown:], block[unknown:]
+        cell = np.searchsorted(self._numbers.start, block, side="right") - 1
+        piece = self._numbers.piece[cell]
+        inside = self._numbers.inside[cell] + block - self._numbers.start[cell]
+        for a, b in pairwise([0, *(np.flatnonzero(np.diff(piece)) + 1).tolist(), len(order)]):
             if b > a:
-                yield self.pieces[int(first)], order[a:b]
-
-    def piece_of(self, block: int) -> Piece:
-        """Return the piece that holds a block."""
-        return self.pieces[max(first for first in self.pieces if first <= block)]
+                yield self.pieces[int(piece[a])], order[a:b], inside[a:b]
 
     @property
     def n_blocks(self) -> int:
