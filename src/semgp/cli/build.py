@@ -36,7 +36,7 @@ def build(
     *,
     out: Path,
     kind: Kind = "gp",
-    model: str = "indoor-rgbd",
+    model: str = "general",
     resolution: float | None = None,
     vertical: Axis = "z",
     learn: bool = True,
@@ -61,8 +61,8 @@ def build(
     kind
         The method: the Gaussian-process map, the semantic OctoMap, or a baseline.
     model
-        The GP's model: indoor-rgbd, outdoor-lidar, a file that "semgp learn" wrote, or paper, the whole-scan GP of
-        the paper.
+        The GP's model: general; outdoor-lidar or indoor-rgbd for labels of a network; indoor-labels for few labels
+        that are right; a file that "semgp learn" wrote; or paper, the whole-scan GP of the paper.
     resolution
         Edge in metres of the voxels in which labels are added up, instead of the model's.
     vertical
@@ -129,7 +129,7 @@ def learn(
     out
         The model file to write.
     model
-        Where to begin: indoor-rgbd, outdoor-lidar, or a model file.
+        Where to begin: general, indoor-rgbd, indoor-labels, outdoor-lidar, or a model file.
     resolution
         Edge in metres of the voxels in which labels are added up, instead of the model's.
     vertical

@@ -15,6 +15,7 @@ from semgp.gp.hyperparameters import Bounds
 from semgp.gp.model import GPModel
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.learning import learn_model
+from semgp.maps.presets import GENERAL
 from semgp.octomap import SemanticOctoMap
 from semgp.picture.colour import by_class, by_value
 from semgp.picture.compose import colour_bar, legend, panels, stack
@@ -34,7 +35,14 @@ def demo_task(seed: int) -> tuple[SyntheticScan, Task]:
     return scan, Task("room", "sparse and noisy", (scan.observed,), scan.truth, MODEL.max_points, seed)
 
 
-def _gp(task: Task) -> Built:
+def _blocks(task: Task) -> Built:
+    gp_map = GPSemanticMap(task.truth.classes, GENERAL)
+    built = of_all(gp_map, task)
+    gp_map.solve()
+    return built
+
+
+def _paper(task: Task) -> Built:
     model, _ = learn_model(task.small, replace(MODEL, seed=task.seed), bounds=BOUNDS, max_iterations=8)
     gp_map = GPSemanticMap(task.truth.classes, model)
     gp_map.update(task.small)
@@ -43,7 +51,8 @@ def _gp(task: Task) -> Built:
 
 
 METHODS: Mapping[str, Method] = {
-    "GP map": _gp,
+    "GP map": _blocks,
+    "the paper's": _paper,
     "k-NN": lambda task: of_all(KNNMap(task.truth.classes), task),
     "OctoMap": lambda task: of_all(SemanticOctoMap(task.truth.classes, resolution=0.1), task),
     "BKI": lambda task: of_all(BKIMap(task.truth.classes, resolution=0.05, ell=0.15), task),
