@@ -116,7 +116,7 @@ def answer_prior(pairs: Pairs, order: I64, prior_variance: float, probability: F
 
 
 def prior_probabilities(link: Link, n_classes: int) -> F32:
-    """Return the probabilities (C,) far from all data: what every block's answer tends to."""
+    """Return the probabilities (C,) far from all data: what every pooled answer tends to."""
     p, u, nothing = np.empty((1, 1), np.float32), np.zeros(1, np.float32), np.empty(0, np.int16)
     class_probabilities(np.zeros((SHARED, 1), np.float32), nothing, 1, link, p)
     if link.other or link.error_rate > 0:

@@ -72,7 +72,8 @@ class PaperExpert:
     def __init__(self, model: BlockModel, X: Array, mass: Array, prior: Array) -> None:
         self._present = np.flatnonzero(mass.sum(axis=0) > 0)
         self._prior, self._n = prior, mass.sum()
-        inference = model.posterior if len(self._present) > 1 else "laplace"  # one class needs no softmax
+        one_class = model.posterior == "softmax" and len(self._present) == 1  # whose softmax is 1 and says nothing
+        inference = "laplace" if one_class else model.posterior
         gp = GPModel(kernels=(model.kernel,), inference=inference, n_inducing=None, m=(-1.0,))
         shares = mass[:, self._present] / mass.sum(axis=1, keepdims=True)
         self._expert = fit_expert(gp, self._present, X, shares)

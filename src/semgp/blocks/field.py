@@ -41,7 +41,8 @@ class Field:
         self.store = BlockStore()
         self._kernel = mixture(model.kernel, model.n_dims)
         self._noise, self._link = model.noise(n_classes), model.link(n_classes)
-        self._unknown = prior_probabilities(self._link, n_classes)
+        pooled = model.posterior not in EXPERTS
+        self._unknown = prior_probabilities(self._link, n_classes) if pooled else self._link.prior
         self.prior_variance = float(self._kernel.variance.sum())
 
     def add(self, points: F64, labels: I32 | None, weights: F32 | None, features: F32) -> None:

@@ -19,19 +19,43 @@ def inverse_factor(A: F32, out: F32) -> None:
     and row k of L^-1 is D [-L_k0 ... L_k,k-1, I] [L^-1 of the rows above].
     """
     n = len(A)
-    out[:, :] = 0
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = 0
     for k in range(0, n, _PANEL):
         e = min(k + _PANEL, n)
         _factor(A, k, e)
         _invert(A, k, e, out)
-        D = np.ascontiguousarray(out[k:e, k:e])
+        D = _copy(out, k, e, k, e)
         if k > 0:
-            left = np.dot(np.ascontiguousarray(A[k:e, :k]), np.ascontiguousarray(out[:k, :k]))
-            out[k:e, :k] = -np.dot(D, left)
+            left = np.dot(D, np.dot(_copy(A, k, e, 0, k), _copy(out, 0, k, 0, k)))
+            for i in range(e - k):
+                for j in range(k):
+                    out[k + i, j] = -left[i, j]
         if e < n:
-            panel = np.dot(np.ascontiguousarray(A[e:, k:e]), D.T)
-            A[e:, k:e] = panel
-            A[e:, e:] -= np.dot(panel, panel.T)
+            panel = np.dot(_copy(A, e, n, k, e), D.T)
+            _update(A, k, e, panel, np.dot(panel, panel.T))
+
+
+@njit(cache=True, nogil=True)
+def _copy(A: F32, a: int, b: int, c: int, d: int) -> F32:
+    """A[a:b, c:d] in one piece."""
+    out = np.empty((b - a, d - c), np.float32)
+    for i in range(b - a):
+        for j in range(d - c):
+            out[i, j] = A[a + i, c + j]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _update(A: F32, k: int, e: int, panel: F32, product: F32) -> None:
+    """Put the panel in its place below the diagonal, and take its product from the lower triangle that is left."""
+    for i in range(len(panel)):
+        row = A[e + i]
+        for j in range(e - k):
+            row[k + j] = panel[i, j]
+        for j in range(i + 1):
+            row[e + j] -= product[i, j]
 
 
 @njit(cache=True, nogil=True)
@@ -45,7 +69,8 @@ def pack(L: F32, flat: F32) -> None:
     """Write the lower triangle of L (n, n) row by row: half the memory, and fresh memory is slow."""
     at = 0
     for i in range(len(L)):
-        flat[at : at + i + 1] = L[i, : i + 1]
+        for j in range(i + 1):
+            flat[at + j] = L[i, j]
         at += i + 1
 
 
@@ -54,8 +79,8 @@ def unpack(flat: F32, L: F32) -> None:
     """Fill L (n, n) from its lower triangle; zeros above the diagonal."""
     at = 0
     for i in range(len(L)):
-        L[i, : i + 1] = flat[at : at + i + 1]
-        L[i, i + 1 :] = 0
+        for j in range(len(L)):
+            L[i, j] = flat[at + j] if j <= i else np.float32(0)
         at += i + 1
 
 

@@ -33,8 +33,8 @@ FLOOR = np.float32(1e-6)
 class Link(NamedTuple):
     """What the link depends on.
 
-    prior pi (C,), or (C + 1,) with the mass of no class last, if `other` is set. power: pi to the sum of the
-    weights. delta, v_0. The three weights. errors r (C,), error_rate b and error_power k.
+    prior pi (C,), or (C + 1,) with the mass of no class last, if `other` is set. power: pi over the largest pi, to
+    the sum of the weights. delta, v_0. The three weights. errors r (C,), error_rate b and error_power k.
     """
 
     prior: F32
@@ -52,22 +52,25 @@ class Link(NamedTuple):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def class_probabilities(F: F32, present: I16, m: int, link: Link, p: F32) -> None:
-    """Fill in p (P + 1, m): probabilities of the present classes, and what an absent one's pi_c power multiplies.
+    """Fill in p (P + 1, m): probabilities of the P present classes, and what an absent one's `power` multiplies.
 
     F (3 + 3 P, m) are the latent values: coefficients times covariances.
     """
     P = len(present)
     prior, delta, v_0 = link.prior, link.delta, link.v_0
+    most = np.float32(0)
+    for pi in prior:
+        most = max(most, pi)
     w_i, w_l, w_v = link.indicator, link.log_ratio, link.vote
     peak = np.full(m, np.float32(-1e30), np.float32)
     for c in range(P + 1):
         row = p[c]
-        pi = prior[present[c]] if c < P else np.float32(1)
+        pi = prior[present[c]] if c < P else most
         for q in range(m):
             row[q] = 0
         if w_i > 0:
             indicator = F[2 + c] if c < P else F[0]
-            sign, offset = (np.float32(1), pi) if c < P else (np.float32(-1), np.float32(1))
+            sign, offset = (np.float32(1), pi) if c < P else (-pi, pi)
             for q in range(m):
                 latent = offset + sign * indicator[q]
                 row[q] += w_i * log(max(latent, np.float32(0)) + delta * pi)

@@ -70,7 +70,7 @@ def gather(
             low[d], high[d] = 0, edge
     n = 0
     for s in own:
-        _add_site(layout, s, 0, 0, 0, marks, mark, n, out)
+        _add_site(layout, s, 0.0, 0.0, 0.0, marks, mark, n, out)
         n += 1
     near_left, far_left = sizes.total - sizes.far - n, sizes.far
     voxels, cells, order = _nearest(layout, around, low, high, edge, sizes.total)
@@ -143,8 +143,13 @@ def _nearest(layout: Layout, around: I32, low: F32, high: F32, edge: float, want
     if n > wanted:
         select(distance, order, 0, n, wanted, 0)
         order = order[:wanted]
-    ranked = np.argsort(distance[order, 0], kind="mergesort")
-    return voxels, cells, order[ranked]
+    for i in range(1, len(order)):  # a hundred at most: insertion
+        v, j = order[i], i
+        while j > 0 and distance[v, 0] < distance[order[j - 1], 0]:
+            order[j] = order[j - 1]
+            j -= 1
+        order[j] = v
+    return voxels, cells, order
 
 
 @njit(cache=True, nogil=True)

@@ -122,6 +122,8 @@ class BlockModel:
                 if not frequencies or not all(math.isfinite(p) and p > 0 for p in frequencies):
                     raise InputError(f"{name} must have a positive frequency for each class.")
                 object.__setattr__(self, name, frequencies)
+        if not isinstance(self.other, bool):
+            raise InputError(f"other is true or false, not {self.other!r}.")
         if not (0 <= self.error_rate < math.inf and 0 < self.error_power < math.inf):
             raise InputError("error_rate must be 0 or above, error_power above 0, both finite.")
         if self.posterior in EXPERTS and (self.other or self.error_rate > 0):
@@ -194,8 +196,9 @@ class BlockModel:
         prior = self.class_prior(n_classes)
         w_i, w_l, w_v = (np.float32(w) for w in self.powers)
         errors = np.ones(n_classes) if self.errors is None else np.asarray(self.errors)
+        power = (prior / prior.max()) ** (w_i + w_l + w_v)
         return Link(
-            prior, prior ** (w_i + w_l + w_v), np.float32(self.delta), np.float32(self.v_0), w_i, w_l, w_v,
+            prior, power, np.float32(self.delta), np.float32(self.v_0), w_i, w_l, w_v,
             self.other, np.asarray(errors / errors.sum(), dtype=np.float32), self.error_rate, self.error_power,
         )  # fmt: skip
 
@@ -215,6 +218,9 @@ class BlockModel:
         InputError
             Fields that are missing, unknown or of the wrong kind.
         """
+        listed = ("prior", "errors", "weights", "features")
+        if any(not isinstance(plain.get(n, []), list | tuple | None) for n in listed):
+            raise InputError(f"this is no block model: {', '.join(listed)} must be lists.")
         missing = cls.__dataclass_fields__.keys() - plain.keys()
         if missing:
             raise InputError(f"this is no block model: it lacks {', '.join(sorted(missing))}.")

@@ -105,7 +105,7 @@ def find_pairs(points: F64, chosen: I64, resolution: float, origin: F64, half: f
         if n + 8 * _MOST > capacity:
             capacity = 2 * capacity + 8 * _MOST
             point, block = _longer(point, capacity), _longer(block, capacity)
-            weight, local = _longer(weight, capacity), _longer(local, capacity)
+            weight, local = _longer(weight, capacity), _longer_rows(local, capacity)
         inside = True
         for d in range(3):
             v[d] = points[i, d] / resolution - origin[d]
@@ -113,7 +113,8 @@ def find_pairs(points: F64, chosen: I64, resolution: float, origin: F64, half: f
             low[d], high[d] = _cell(v[d] - half), _cell(v[d] + half)
         if not inside:
             point[n], block[n], weight[n] = i, -1, 1
-            local[n, :] = 0
+            for d in range(3):
+                local[n, d] = 0
             n += 1
             continue
         for x in range(low[0], high[0] + 1):
@@ -162,7 +163,8 @@ def home_blocks(points: F64, resolution: float, origin: F64, trees: CellTrees, b
             v[d] = points[i, d] / resolution - origin[d]
             inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
         block[i] = -1
-        local[i] = 0
+        for d in range(3):
+            local[i, d] = 0
         if not inside:
             continue
         for d in range(3):
@@ -200,6 +202,18 @@ def _share(v: float, half: float, x: int, low: int, high: int) -> float:
 
 @njit(cache=True, nogil=True)
 def _longer(a: Any, n: int) -> Any:
-    out = np.empty((n, *a.shape[1:]), a.dtype)
-    out[: len(a)] = a
+    """The array with room for n numbers."""
+    out = np.empty(n, a.dtype)
+    for i in range(len(a)):
+        out[i] = a[i]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _longer_rows(a: F32, n: int) -> F32:
+    """The array with room for n rows."""
+    out = np.empty((n, a.shape[1]), a.dtype)
+    for i in range(len(a)):
+        for d in range(a.shape[1]):
+            out[i, d] = a[i, d]
     return out

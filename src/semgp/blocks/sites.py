@@ -201,6 +201,8 @@ class Sites:
             Keys out of range or twice, sites without mass or beyond their voxel, an origin within a cell.
         """
         keys = arrays["voxels"]
+        if len(np.unique(keys)) != len(keys):
+            raise InputError("the stored sites are damaged: a voxel occurs twice.")
         if not len(keys):
             return
         total = arrays["mass"].sum(axis=1, dtype=np.int64)
@@ -213,8 +215,6 @@ class Sites:
             raise InputError("the stored sites are damaged: their origin is no corner of a cell.")
         self.origin = arrays["origin"]
         self.voxels.insert(keys)
-        if len(self) != len(keys):
-            raise InputError("the stored sites are damaged: a voxel occurs twice.")
         self._grow()
         self._mass[: len(self)], self._place[: len(self)] = arrays["mass"], arrays["place"]
         self._link(0)

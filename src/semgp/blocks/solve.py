@@ -61,6 +61,17 @@ class Solved(NamedTuple):
     factor: F32
 
 
+def taken(solved: Solved, blocks: I64) -> Solved:
+    """Return copies of some blocks' posteriors, in this order."""
+    rows = [solved.coefficients[solved.at[b] : solved.at[b + 1]] for b in blocks]
+    factors = [solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]] for b in blocks]
+    at, at_factor = (np.cumsum([0, *map(len, parts)], dtype=np.int64) for parts in (rows, factors))
+    return Solved(
+        solved.n[blocks], solved.X[blocks], solved.k[blocks], solved.n_present[blocks], solved.present[blocks],
+        at, np.concatenate(rows), at_factor, np.concatenate(factors),
+    )  # fmt: skip
+
+
 @njit(cache=True, nogil=True)
 def solve_cells(
     layout: Layout,
@@ -129,10 +140,14 @@ def solve_cells(
             W = SHARED + 3 * P
             if solved.at[b] + W * n > len(coefficients):
                 longer = np.empty(max(2 * len(coefficients), solved.at[b] + W * n), np.float32)
-                longer[: solved.at[b]] = coefficients[: solved.at[b]]
+                for j in range(solved.at[b]):
+                    longer[j] = coefficients[j]
                 coefficients = longer
             solved.n[b], solved.n_present[b] = n, P
-            solved.X[b, :, :n], solved.k[b, :n] = members.X[:, :n], members.k[:n]
+            for j in range(n):
+                solved.k[b, j] = members.k[j]
+                for d in range(D):
+                    solved.X[b, d, j] = members.X[d, j]
             solved.at[b + 1] = solved.at[b] + W * n
             solved.at_factor[b + 1] = solved.at_factor[b] + (packed_size(n) if noise.solve else 0)
             rows = coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n)
@@ -148,7 +163,9 @@ def solve_cells(
                 )
                 pack(L_inverse, solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]])
             else:
-                rows[: 2 + 2 * P] = 0
+                for w in range(2 + 2 * P):
+                    for j in range(n):
+                        rows[w, j] = 0
     return Solved(
         solved.n,
         solved.X,
@@ -210,13 +227,17 @@ def solve_block(
     P = len(present)
     _targets(rows, n, present, noise)
     A = K_flat[: n * n].reshape(n, n)
-    jitter = np.float32(JITTER) * kernel.variance.sum()
+    jitter = np.float32(0)
+    for v in kernel.variance:
+        jitter += np.float32(JITTER) * v
     covariance_lower(X, n, kernel, A, work)
     for j in range(n):
         A[j, j] += np.float32(noise.s_n) / rows[2 + 2 * P, j] + np.float32(noise.nugget) / k[j] + jitter
     inverse_factor(A, factor)
-    targets = rows[: 2 + 2 * P]
-    targets[:, :] = np.dot(np.dot(targets, factor.T), factor)
+    found = np.dot(np.dot(rows[: 2 + 2 * P], factor.T), factor)
+    for w in range(2 + 2 * P):
+        for j in range(n):
+            rows[w, j] = found[w, j]
 
 
 @njit(cache=True, nogil=True, fastmath=True)

@@ -12,7 +12,7 @@ import numpy as np
 from semgp.blocks.arrays import F32, I8, I32, I64, Bool
 from semgp.blocks.experts import BlockExpert
 from semgp.blocks.pairs import CellTrees
-from semgp.blocks.solve import Solved
+from semgp.blocks.solve import Solved, taken
 from semgp.voxels import VoxelTable
 
 
@@ -97,12 +97,13 @@ class BlockStore:
                 self._release(int(old))
             self.pieces[first] = Piece(first, piece, part.stop - part.start)
             self._piece[cells[part]] = first
+        self._block[cells], self._leaves[cells] = block_at[:-1], leaves
         self._compact_trees(cells)
         self._tree_at[cells] = len(self._axes) + np.concatenate([[0], (leaves - 1).cumsum()[:-1]])
         self._axes, self._cuts = np.concatenate([self._axes, axes]), np.concatenate([self._cuts, cuts])
-        self._block[cells], self._leaves[cells] = block_at[:-1], leaves
         self.next_block = int(block_at[-1])
         self.stale[cells] = False
+        self._shrink_pieces()
 
     def is_solved(self, cells: I32) -> Bool:
         """Return which cells have blocks, up to date or not."""
@@ -161,6 +162,23 @@ class BlockStore:
             self.pieces[first].cells -= 1
             if self.pieces[first].cells == 0:
                 self._spare = [*self._spare[-_MOST_SPARE:], self.pieces.pop(first).solved.factor]
+
+    def _shrink_pieces(self) -> None:
+        """Copy what is in use of pieces that have more blocks of no use than others."""
+        solved = np.flatnonzero(self._block >= 0)
+        firsts = np.array(sorted(self.pieces))
+        place = np.searchsorted(firsts, self._piece[solved])
+        used = np.bincount(place, self._leaves[solved], len(firsts)).astype(np.int64)
+        for first, n in zip(firsts.tolist(), used.tolist()):
+            piece = self.pieces[first]
+            if 2 * n >= len(piece.solved.n):
+                continue
+            mine = solved[self._piece[solved] == first]
+            mine = mine[np.argsort(self._block[mine])]
+            starts, sizes = self._block[mine] - first, self._leaves[mine]
+            keep = np.concatenate([np.arange(a, a + k) for a, k in zip(starts, sizes)])
+            self._block[mine] = first + np.concatenate([[0], sizes.cumsum()[:-1]])
+            self.pieces[first] = Piece(first, taken(piece.solved, keep), len(mine))
 
     def _compact_trees(self, dropped: I32) -> None:
         """Rewrite the trees without those of `dropped` cells once more than half of them are of no use."""
