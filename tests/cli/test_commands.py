@@ -96,7 +96,7 @@ class TestBadInput:
         before = built.read_bytes()
         one_class = built.with_name("floor.npz")
         write_npz(one_class, corner[corner.hard_labels == 0])
-        self.fails(capsys, "at least two", "build", one_class, "--out", built, "--quiet")
+        self.fails(capsys, "at least two", "build", one_class, "--model", "paper", "--out", built, "--quiet")
         assert built.read_bytes() == before
 
     def test_no_labels(self, corner: LabelledCloud, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,10 +20,12 @@ def add_cloud(field: Field, cloud: LabelledCloud) -> None:
     InputError
         A cloud without the features that the model asks for, or points a million voxels from the first.
     """
-    labelled = cloud.labelled
-    part = cloud if labelled.all() else cloud[labelled]
-    weights = None if part.labels is not None else part.class_weights
-    field.add(part.points, part.labels, weights, cloud_features(part, field.model.features))
+    keep = cloud.labelled
+    features = cloud_features(cloud, field.model.features)
+    if cloud.labels is not None:
+        field.add(cloud.points[keep], cloud.labels[keep], None, features[keep])
+    elif cloud.weights is not None:
+        field.add(cloud.points[keep], None, cloud.class_weights[keep], features[keep])
 
 
 def cloud_features(cloud: LabelledCloud, names: tuple[str, ...]) -> F32:

@@ -43,15 +43,15 @@ class ManyBlocks:
         self.tolerance = 0.0
         self._field = Field(model, len(classes))
 
-    def add(self, part: LabelledCloud) -> None:
-        """Add a cloud of labelled points.
+    def add(self, cloud: LabelledCloud) -> None:
+        """Add the labelled points of a cloud.
 
         Raises
         ------
         InputError
             Features that are missing, or points a million voxels from the first.
         """
-        add_cloud(self._field, part)
+        add_cloud(self._field, cloud)
 
     def answer(self, X: NDArray[np.float64], features: NDArray[np.float32] | None) -> Prediction:
         """Answer at points (M, 3) with features (M, F), NaN where unknown, or None for all unknown.

@@ -15,7 +15,7 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
 from semgp.maps.blocks import ManyBlocks
-from semgp.maps.protocol import query_points, training_part
+from semgp.maps.protocol import query_points, require_classes
 from semgp.maps.whole import WholeScan
 from semgp.prediction import Prediction
 
@@ -67,7 +67,8 @@ class GPSemanticMap:
         InputError
             Classes that differ from the map's, features that are missing, or points too far from the first.
         """
-        self._state.add(training_part(cloud, self.classes))
+        require_classes(cloud, self.classes)
+        self._state.add(cloud)
 
     def query(self, points: ArrayLike, features: ArrayLike | None = None) -> Prediction:
         """Return class probabilities, latent mean and variance at points.

@@ -46,9 +46,10 @@ class WholeScan:
         self._training: TrainingSet | None = None
         self._expert: Expert | None = None
 
-    def add(self, part: LabelledCloud) -> None:
-        """Add a cloud of labelled points."""
-        self._add(part.points, part.class_weights)
+    def add(self, cloud: LabelledCloud) -> None:
+        """Add the labelled points of a cloud."""
+        keep = cloud.labelled
+        self._add(cloud.points[keep], cloud.class_weights[keep])
 
     def _add(self, points: NDArray[np.float64], weights: NDArray[np.float32]) -> None:
         self._points = np.concatenate([self._points, points])
