@@ -4,6 +4,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from semgp.blocks.learning import learn_blocks, learn_from_scans
+    from semgp.blocks.model import BlockModel
     from semgp.classes import MISSING, Classes
     from semgp.cloud import LabelledCloud
     from semgp.errors import FileFormatError, InputError, MissingExtraError, SemgpError
@@ -11,6 +13,7 @@ if TYPE_CHECKING:
     from semgp.maps.files import load_map, save_map
     from semgp.maps.gp import GPSemanticMap
     from semgp.maps.learning import learn_model
+    from semgp.maps.presets import PRESETS
     from semgp.octomap import SemanticOctoMap
     from semgp.prediction import Prediction
     from semgp.readers import open_scans, read
@@ -20,6 +23,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "MISSING",
+    "PRESETS",
+    "BlockModel",
     "Classes",
     "FileFormatError",
     "GPModel",
@@ -30,6 +35,8 @@ __all__ = [
     "Prediction",
     "SemanticOctoMap",
     "SemgpError",
+    "learn_blocks",
+    "learn_from_scans",
     "learn_model",
     "load_map",
     "open_scans",
@@ -43,6 +50,9 @@ _HOME = {
     **dict.fromkeys(("MISSING", "Classes"), "semgp.classes"),
     "LabelledCloud": "semgp.cloud",
     **dict.fromkeys(("FileFormatError", "InputError", "MissingExtraError", "SemgpError"), "semgp.errors"),
+    "BlockModel": "semgp.blocks.model",
+    **dict.fromkeys(("learn_blocks", "learn_from_scans"), "semgp.blocks.learning"),
+    "PRESETS": "semgp.maps.presets",
     "GPModel": "semgp.gp.model",
     **dict.fromkeys(("load_map", "save_map"), "semgp.maps.files"),
     "GPSemanticMap": "semgp.maps.gp",

@@ -15,6 +15,7 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
 from semgp.maps.blocks import ManyBlocks
+from semgp.maps.presets import GENERAL
 from semgp.maps.protocol import query_points, require_classes
 from semgp.maps.whole import WholeScan
 from semgp.prediction import Prediction
@@ -33,7 +34,7 @@ class GPSemanticMap:
     classes : Classes
         The map's classes, any number.
     model : BlockModel or GPModel, optional
-        See `semgp.blocks.learning.learn_blocks`, `semgp.maps.presets` and `semgp.maps.learning.learn_model`.
+        Left out, the preset `GENERAL`. See `semgp.blocks.learning.learn_blocks`, `semgp.maps.presets` and `semgp.maps.learning.learn_model`.
 
     tolerance : float, optional
         For live maps: cells of a block map whose sites have changed by less than this on average since they were
@@ -54,7 +55,7 @@ class GPSemanticMap:
         if not (math.isfinite(tolerance) and tolerance >= 0):
             raise InputError(f"the tolerance must be a number, 0 or above, not {tolerance}.")
         self.classes = classes
-        self.model = BlockModel() if model is None else model
+        self.model = GENERAL if model is None else model
         self._state = _state(classes, self.model)
         if isinstance(self._state, ManyBlocks):
             self._state.tolerance = tolerance
