@@ -5,8 +5,8 @@
 general comes from six synthetic rooms, whose true labels judge maps of the observed ones. outdoor-lidar comes from
 the ten scans of SemanticKITTI 08 with a network's labels, which judge each other; no true label is used.
 indoor-rgbd and indoor-labels come from eight frames of NYU Depth V2 with the labels of a network, and with few
-true ones; the frames' true labels judge. The data are read from $SEMGP_DATA or ../shared/data beside the checkout. The
-class priors are left out: presets are for any classes.
+true ones; the frames' true labels judge. The data are read from $SEMGP_DATA or ../shared/data beside the checkout.
+The class priors are left out: presets are for any classes.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ class GPSemanticMap:
     classes : Classes
         The map's classes, any number.
     model : BlockModel or GPModel, optional
-        Left out, the preset `GENERAL`. See `semgp.blocks.learning.learn_blocks`, `semgp.maps.presets` and `semgp.maps.learning.learn_model`.
-
+        Left out, the preset `GENERAL`. See `semgp.maps.presets`, `semgp.blocks.learning` and, for the paper's,
+        `semgp.maps.learning`.
     tolerance : float, optional
         For live maps: cells of a block map whose sites have changed by less than this on average since they were
         last solved are left as they are. At 0, answers are exact, whatever the order of updates. Around 0.2, a

@@ -18,7 +18,7 @@ GENERAL = BlockModel(
     kernel=Matern52(ell=(0.0528,), sf=0.174) + Matern52(ell=(0.349,), sf=0.185),
     resolution=0.05, s_n=0.5, nugget=0.108, a=0.209, delta=0.00507, v_0=0.0537, weights=(1.48, 0.579, 0.079),
 )  # fmt: skip
-"""Indoor scans, some labels missing and some wrong, sites of five centimetres: learned from six synthetic rooms."""
+"""Indoor scans, some labels missing, some wrong, sites of five centimetres: learned from six synthetic rooms."""
 
 OUTDOOR_LIDAR = BlockModel(
     kernel=Matern52(ell=(0.429, 0.429, 0.125), sf=0.19) + Matern52(ell=(5.31, 5.31, 1.27), sf=0.696),
