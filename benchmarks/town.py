@@ -5,8 +5,8 @@
 Every `stride`-th scan of `SyntheticTown` (a metre of drive each) with its noisy labels is added to the map, which
 is brought up to date after each, until so many points are in. Printed after each million points: milliseconds a
 scan of update and solve, sites, bytes a site at rest and solved, the process's peak memory, and accuracy at the
-last scan's points. The exponent is that of seconds = a * sites^b after the first quarter, in which scans come to
-touch a whole range of blocks: 1 is linear growth with mapped surface.
+last scan's points. The exponent is that of seconds = a * sites^b, both counted from the first quarter on, in which
+scans come to touch a whole range of blocks: 1 is linear growth with mapped surface.
 """
 
 from __future__ import annotations

@@ -11,7 +11,8 @@ from semgp.blocks.field import Field
 from semgp.blocks.model import BlockModel
 from semgp.blocks.pairs import Pairs, find_pairs
 from semgp.blocks.patches import patch
-from semgp.blocks.solve import JITTER, SHARED, Solved
+from semgp.blocks.solve import JITTER
+from semgp.blocks.solved import SHARED, Solved
 from semgp.blocks.store import Piece
 from semgp.voxels import AXIS_BITS, HALF_RANGE
 

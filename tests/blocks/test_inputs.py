@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT
 from semgp.blocks.field import Field
 from semgp.blocks.inputs import add_cloud, cloud_features
 from semgp.blocks.model import BlockModel
-from semgp.blocks.sites import FEATURE_UNIT, MASS_UNIT
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from semgp.blocks.sites import CELL, FEATURE_UNIT, MASS_UNIT, PLACE_UNIT, Sites, cell_keys
+from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT
+from semgp.blocks.sites import CELL, Sites, cell_keys
 from semgp.errors import InputError
 from tests.blocks.naive import Array, featureless, voxel_index
 

@@ -12,7 +12,7 @@ from semgp.blocks.covariance import Mixture, covariance_tile
 from semgp.blocks.linear import unpack
 from semgp.blocks.link import Link, class_probabilities, error_shares
 from semgp.blocks.pairs import Pairs
-from semgp.blocks.solve import SHARED, Solved
+from semgp.blocks.solved import SHARED, Solved
 
 TILE = 64
 """Points that are answered together: their covariances with a block stay in the cache."""

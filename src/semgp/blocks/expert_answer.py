@@ -11,7 +11,7 @@ from semgp.blocks.arrays import F32, I64
 from semgp.blocks.experts import BlockExpert, solve_expert
 from semgp.blocks.model import BlockModel
 from semgp.blocks.pairs import Pairs
-from semgp.blocks.solve import SHARED
+from semgp.blocks.solved import SHARED
 from semgp.blocks.store import Piece
 
 

@@ -14,7 +14,8 @@ from semgp.blocks.layout import around_keys, lay_out, neighbours
 from semgp.blocks.model import EXPERTS, BlockModel
 from semgp.blocks.pairs import find_pairs, home_blocks, mark_cells
 from semgp.blocks.sites import CELL, Sites
-from semgp.blocks.solve import Solved, solve_cells
+from semgp.blocks.solve import solve_cells
+from semgp.blocks.solved import Solved
 from semgp.blocks.store import BlockStore, sorted_by
 from semgp.parallel import n_workers, parallel_map, slices
 

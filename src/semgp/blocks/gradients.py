@@ -15,7 +15,8 @@ from semgp.blocks.arrays import F32, F64, I16, I32
 from semgp.blocks.covariance import Mixture, covariance_tile, derivative_tile
 from semgp.blocks.link import Link, class_probabilities
 from semgp.blocks.patches import Packed
-from semgp.blocks.solve import SHARED, Noise, solve_block
+from semgp.blocks.solve import Noise, solve_block
+from semgp.blocks.solved import SHARED
 
 
 class Gradient(NamedTuple):

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT
 from semgp.blocks.arrays import F32, I32, I64, U32
-from semgp.blocks.sites import CELL_BITS, FEATURE_UNIT, MASS_UNIT, PLACE_UNIT, Sites
+from semgp.blocks.sites import CELL_BITS, Sites
 from semgp.parallel import n_workers, parallel_map, slices
 from semgp.voxels import STEP
 

@@ -24,7 +24,7 @@ from numba import njit
 
 from semgp.blocks.arrays import F32, I16
 from semgp.blocks.elementary import exp_minus, log
-from semgp.blocks.solve import SHARED
+from semgp.blocks.solved import SHARED
 
 FLOOR = np.float32(1e-6)
 """Least value of what is divided by or raised to a power."""

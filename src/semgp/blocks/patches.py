@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from semgp.blocks.arrays import F32, I16, I32, I64
-from semgp.blocks.solve import SHARED, Solved
+from semgp.blocks.solved import SHARED, Solved
 
 
 class Patch(NamedTuple):

@@ -10,29 +10,17 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from semgp.blocks.accumulate import MASS_UNIT, PLACE_UNIT, add_hard, add_soft, chain
 from semgp.blocks.arrays import F32, F64, I32, I64, U32
 from semgp.errors import InputError
 from semgp.voxels import HALF_RANGE, VoxelTable, voxel_keys, voxel_origin
-
-MASS_UNIT = 1 << 12
-"""Steps of a class mass of one label."""
-
-PLACE_UNIT = 1 << 24
-"""Steps of a position within its voxel: 12 nanometres at 0.2 m."""
-
-FEATURE_UNIT = 1 << 16
-"""Steps of a feature of 1."""
 
 CELL_BITS = 6
 CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
 
-
-_FULL = 1 << 31
-"""Mass of a site, half a million labels, beyond which labels change nothing and are not added: sums never wrap."""
 
 _LARGEST_WEIGHT, _LARGEST_FEATURE = 64, 30_000
 
@@ -151,11 +139,11 @@ class Sites:
         self._grow()
         self._link(known)
         if labels is not None:
-            _add_hard(
+            add_hard(
                 rows, labels, points, self.resolution, features, self._cell, self._mass, self._place, self.drift
             )
         elif weights is not None:
-            _add_soft(
+            add_soft(
                 rows, weights, points, self.resolution, features, self._cell, self._mass, self._place, self.drift
             )
         touched = np.zeros(len(self.cells), dtype=bool)
@@ -180,7 +168,7 @@ class Sites:
         new = self.voxels.keys[known:]
         cells = self.cell_ids(cell_keys(new))
         self._cell[known : known + len(new)] = cells
-        _chain(cells, known, self._head, self._size, self._next)
+        chain(cells, known, self._head, self._size, self._next)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays from which `restore` makes the same sites."""
@@ -234,82 +222,3 @@ def _extended(a: NDArray[Any], n: int, fill: int) -> NDArray[Any]:
     longer[: len(a)] = a
     longer[len(a) :] = fill
     return longer
-
-
-@njit(cache=True, nogil=True)
-def _chain(
-    cells: I32,
-    known: int,
-    head: I32,
-    size: I32,
-    following: I32,
-) -> None:
-    for i in range(len(cells)):
-        c = cells[i]
-        following[known + i] = head[c]
-        head[c] = known + i
-        size[c] += 1
-
-
-@njit(cache=True, nogil=True)
-def _add_hard(
-    rows: I64,
-    labels: I32,
-    points: F64,
-    resolution: float,
-    features: F32,
-    cell: I32,
-    mass: U32,
-    place: I64,
-    drift: F64,
-) -> None:
-    for i in range(len(rows)):
-        r, total = rows[i], np.int64(0)
-        for c in range(mass.shape[1]):
-            total += np.int64(mass[r, c])
-        if total > _FULL:
-            continue
-        drift[cell[r]] += (1.5 - mass[r, labels[i]] / total) * MASS_UNIT / (total + MASS_UNIT) if total else 1.0
-        mass[r, labels[i]] += np.uint32(MASS_UNIT)
-        _add_place(r, MASS_UNIT, points[i], resolution, features[i], place)
-
-
-@njit(cache=True, nogil=True)
-def _add_soft(
-    rows: I64,
-    weights: F32,
-    points: F64,
-    resolution: float,
-    features: F32,
-    cell: I32,
-    mass: U32,
-    place: I64,
-    drift: F64,
-) -> None:
-    for i in range(len(rows)):
-        r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
-        for c in range(mass.shape[1]):
-            total += np.int64(mass[r, c])
-        if total > _FULL:
-            continue
-        for c in range(mass.shape[1]):
-            # what the classes lack to one is the mass of the last column, where there is one more than classes
-            w = np.int64(max(MASS_UNIT - int(added), 0))
-            if c < weights.shape[1]:
-                w = np.int64(np.rint(weights[i, c] * MASS_UNIT))
-            added += w
-            agreed += float(w) * float(mass[r, c])
-            mass[r, c] += np.uint32(w)
-        drift[cell[r]] += (
-            (1.5 - agreed / (float(total) * float(added))) * added / (total + added) if total else 1.0
-        )
-        _add_place(r, added, points[i], resolution, features[i], place)
-
-
-@njit(cache=True, nogil=True)
-def _add_place(row: np.int64, w: int | np.int64, point: F64, resolution: float, features: F32, place: I64) -> None:
-    for d in range(3):
-        v = point[d] / resolution
-        place[row, d] += w * int(np.rint((v - np.floor(v)) * PLACE_UNIT))
-    for f in range(len(features)):
-        place[row, 3 + f] += w * int(np.rint(features[f] * FEATURE_UNIT))

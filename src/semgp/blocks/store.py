@@ -12,7 +12,7 @@ import numpy as np
 from semgp.blocks.arrays import F32, I8, I32, I64, Bool
 from semgp.blocks.experts import BlockExpert
 from semgp.blocks.pairs import CellTrees
-from semgp.blocks.solve import Solved, taken
+from semgp.blocks.solved import Solved, taken
 from semgp.voxels import VoxelTable
 
 

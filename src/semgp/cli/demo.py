@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def demo(*, out: Path = Path("semgp-demo"), seed: int = 0, quiet: bool = False) -> None:
-    """Map a synthetic room from sparse, partly wrong labels: a table, a picture and a saved map in 30 seconds.
+    """Map a synthetic room from sparse, partly wrong labels: a table, a picture and a saved map, in a minute.
 
     Example: semgp demo --out my-demo
 
