@@ -72,7 +72,7 @@ def add_soft(
     place: I64,
     drift: F64,
 ) -> None:
-    """Add class weights (N, C) to each row's site; what they lack to one goes to a last column, if there is one."""
+    """Add class weights (N, C) to each row's site, and what they lack to one to a column more."""
     for i in range(len(rows)):
         r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
         for c in range(mass.shape[1]):
