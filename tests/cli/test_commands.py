@@ -166,3 +166,46 @@ def test_help_shows_an_example(command: tuple[str, ...], capsys: pytest.CaptureF
     assert "Usage" in text
     if command:
         assert "Example: semgp " + " ".join(command) in " ".join(text.split())
+
+
+class TestBlockModels:
+    @pytest.fixture
+    def scans(self, corner: LabelledCloud, tmp_path: Path) -> list[Path]:
+        paths = [tmp_path / f"scan{i}.npz" for i in range(2)]
+        for i, path in enumerate(paths):
+            write_npz(path, corner[i::2])
+        return paths
+
+    def test_a_learned_model_builds_a_map(self, scans: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+        model, out = scans[0].with_name("model.json"), scans[0].with_name("map.semgp")
+        assert run("learn", *scans, "--model", "general", "--resolution", "0.1", "--out", model, "--quiet") == 0
+        assert json.loads(model.read_text())["resolution"] == 0.1
+        assert run("build", *scans, "--model", model, "--out", out, "--quiet") == 0
+        capsys.readouterr()
+        assert run("info", out, "--json") == 0
+        assert json.loads(capsys.readouterr().out)["model"] == json.loads(model.read_text())
+
+    @pytest.mark.parametrize("preset", ["general", "indoor-rgbd", "indoor-labels", "outdoor-lidar", "paper"])
+    def test_every_preset_builds_a_map(self, preset: str, scans: list[Path]) -> None:
+        out = scans[0].with_name("map.semgp")
+        options = ("--no-learn", "--vertical", "y", "--inducing", "30")
+        assert run("build", *scans, "--model", preset, "--out", out, "--quiet", *options) == 0
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [(None, "cannot be read"), ("{", "is no model"), ("{}", "is no model"), ("[1, 2]", "is no model")],
+    )
+    def test_models_that_are_none(
+        self, text: str | None, message: str, scans: list[Path], capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        model = scans[0].with_name("model.json")
+        if text is not None:
+            model.write_text(text)
+        TestBadInput().fails(
+            capsys, message, "build", *scans, "--model", model, "--out", model.with_name("m.semgp")
+        )
+
+    def test_one_scan_cannot_judge_itself(self, scans: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+        model = scans[0].with_name("model.json")
+        TestBadInput().fails(capsys, "two with labels at least", "learn", scans[0], "--out", model)
+        assert not model.exists()

@@ -218,6 +218,8 @@ class BlockModel:
         InputError
             Fields that are missing, unknown or of the wrong kind.
         """
+        if not isinstance(plain, Mapping):
+            raise InputError("this is no block model: it is no set of named values.")
         listed = ("prior", "errors", "weights", "features")
         if any(not isinstance(plain.get(n, []), list | tuple | None) for n in listed):
             raise InputError(f"this is no block model: {', '.join(listed)} must be lists.")
