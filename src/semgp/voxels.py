@@ -83,11 +83,16 @@ def voxel_keys(
     return keys
 
 
-def voxel_centres(keys: NDArray[np.int64], resolution: float, origin: ArrayLike) -> NDArray[np.float64]:
-    """Return the centres (V, 3), in metres, of the voxels that have these keys."""
+def voxel_indices(keys: NDArray[np.int64], origin: ArrayLike) -> NDArray[np.int64]:
+    """Return the voxels (V, 3), counted from the world's origin, that have these keys."""
     mask = (1 << AXIS_BITS) - 1
     index = np.stack([keys >> 2 * AXIS_BITS, keys >> AXIS_BITS & mask, keys & mask], axis=1)
-    return np.asarray((index - HALF_RANGE + np.asarray(origin) + 0.5) * resolution)
+    return np.asarray(index - HALF_RANGE + np.asarray(origin))
+
+
+def voxel_centres(keys: NDArray[np.int64], resolution: float, origin: ArrayLike) -> NDArray[np.float64]:
+    """Return the centres (V, 3), in metres, of the voxels that have these keys."""
+    return np.asarray((voxel_indices(keys, origin) + 0.5) * resolution)
 
 
 class VoxelTable:

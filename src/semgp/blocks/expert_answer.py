@@ -11,7 +11,7 @@ from semgp.blocks.arrays import F32, I64
 from semgp.blocks.experts import BlockExpert, solve_expert
 from semgp.blocks.model import BlockModel
 from semgp.blocks.pairs import Pairs
-from semgp.blocks.solved import SHARED
+from semgp.blocks.solved import class_mass
 from semgp.blocks.store import Piece
 
 
@@ -42,9 +42,8 @@ def answer_by_experts(
 def _solved(model: BlockModel, piece: Piece, b: int, prior: F32) -> BlockExpert:
     solved = piece.solved
     n, P = int(solved.n[b]), int(solved.n_present[b])
-    rows = solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(SHARED + 3 * P, n)
     mass = np.zeros((n, len(prior)))
-    mass[:, solved.present[b, :P]] = rows[SHARED + 2 * P :].T
+    mass[:, solved.present[b, :P]] = class_mass(solved, b).T
     X = solved.X[b, :, :n].T.astype(np.float64)
     return solve_expert(model, X, mass, solved.k[b, :n].astype(np.float64), prior.astype(np.float64))
 

@@ -12,7 +12,7 @@ from semgp.blocks.covariance import mixture
 from semgp.blocks.expert_answer import answer_by_experts
 from semgp.blocks.layout import around_keys, lay_out, neighbours
 from semgp.blocks.model import EXPERTS, BlockModel
-from semgp.blocks.pairs import find_pairs, home_blocks, mark_cells
+from semgp.blocks.pairs import CellTrees, find_pairs, home_blocks, mark_cells
 from semgp.blocks.sites import CELL, Sites
 from semgp.blocks.solve import solve_cells
 from semgp.blocks.solved import Solved
@@ -123,7 +123,7 @@ class Field:
                     answer_pairs(piece.solved, pairs, order, block, features, self._kernel, self._link, answers)
 
         # points of one block come together, and one thread answers each point
-        order = sorted_by(self.home(points)[0])
+        order = sorted_by(self._home(points, trees)[0])
         parallel_map(run, [order[s] for s in slices(len(points), _JOB)])
         return answers
 
@@ -131,7 +131,10 @@ class Field:
         """Return the block (M,) in whose leaf each point lies, -1 for none, and its place (M, 3) in the cell."""
         if solve:
             self._solve_round(points, 0.0, 0.0)
-        origin, trees = self._origin(), self.store.trees(self.sites.cells)
+        return self._home(points, self.store.trees(self.sites.cells))
+
+    def _home(self, points: F64, trees: CellTrees) -> tuple[I64, F32]:
+        origin = self._origin()
         block, local = np.empty(len(points), np.int64), np.empty((len(points), 3), np.float32)
 
         def run(s: slice) -> None:

@@ -50,15 +50,12 @@ def mark_cells(
     """Mark the cells that the boxes round points overlap, and return the keys of those that are not known."""
     unknown = np.empty(64, np.int64)
     n = 0
-    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+    low, high, v = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3)
     for i in range(len(points)):
-        inside = True
-        for d in range(3):
-            v = points[i, d] / resolution - origin[d]
-            inside = inside and -HALF_RANGE + CELL < v < HALF_RANGE - CELL
-            low[d], high[d] = _cell(v - half), _cell(v + half)
-        if not inside:
+        if not _place(points[i], resolution, origin, v):
             continue
+        for d in range(3):
+            low[d], high[d] = _cell(v[d] - half), _cell(v[d] + half)
         for x in range(low[0], high[0] + 1):
             for y in range(low[1], high[1] + 1):
                 for z in range(low[2], high[2] + 1):
@@ -106,17 +103,14 @@ def find_pairs(points: F64, chosen: I64, resolution: float, origin: F64, half: f
             capacity = 2 * capacity + 8 * _MOST
             point, block = _longer(point, capacity), _longer(block, capacity)
             weight, local = _longer(weight, capacity), _longer_rows(local, capacity)
-        inside = True
-        for d in range(3):
-            v[d] = points[i, d] / resolution - origin[d]
-            inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
-            low[d], high[d] = _cell(v[d] - half), _cell(v[d] + half)
-        if not inside:
+        if not _place(points[i], resolution, origin, v):
             point[n], block[n], weight[n] = i, -1, 1
             for d in range(3):
                 local[n, d] = 0
             n += 1
             continue
+        for d in range(3):
+            low[d], high[d] = _cell(v[d] - half), _cell(v[d] + half)
         for x in range(low[0], high[0] + 1):
             part[0] = _share(v[0], half, x, low[0], high[0])
             for y in range(low[1], high[1] + 1):
@@ -158,14 +152,10 @@ def home_blocks(points: F64, resolution: float, origin: F64, trees: CellTrees, b
     place = np.empty(3, np.float32)
     leaf, share = np.empty(1, np.int64), np.empty(1, np.float32)
     for i in range(len(points)):
-        inside = True
-        for d in range(3):
-            v[d] = points[i, d] / resolution - origin[d]
-            inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
         block[i] = -1
         for d in range(3):
             local[i, d] = 0
-        if not inside:
+        if not _place(points[i], resolution, origin, v):
             continue
         for d in range(3):
             corner[d] = _cell(v[d])
@@ -174,6 +164,16 @@ def home_blocks(points: F64, resolution: float, origin: F64, trees: CellTrees, b
         if cell >= 0 and trees.block[cell] >= 0:
             overlapped(trees.axes, trees.cuts, trees.tree_at[cell], trees.leaves[cell], place, place, leaf, share)
             block[i] = trees.block[cell] + leaf[0]
+
+
+@njit(cache=True, nogil=True)
+def _place(point: F64, resolution: float, origin: F64, v: F64) -> bool:
+    """Fill in the place v (3,) of a point in voxels from the origin; False beyond the range of the keys."""
+    inside = True
+    for d in range(3):
+        v[d] = point[d] / resolution - origin[d]
+        inside = inside and -HALF_RANGE + CELL < v[d] < HALF_RANGE - CELL
+    return inside
 
 
 @njit(cache=True, nogil=True, inline="always")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from semgp.blocks.arrays import F32, I16, I32, I64
-from semgp.blocks.solved import SHARED, Solved
+from semgp.blocks.solved import Solved, class_mass
 
 
 class Patch(NamedTuple):
@@ -28,10 +28,9 @@ class Patch(NamedTuple):
 def patch(solved: Solved, b: int, Y: F32, label: I32) -> Patch:
     """Return the patch of block b of a piece and held-out points (m, D) with labels (m,)."""
     n, P = int(solved.n[b]), int(solved.n_present[b])
-    rows = solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(SHARED + 3 * P, n)
     return Patch(
         solved.X[b, :, :n].copy(), solved.k[b, :n].copy(), solved.present[b, :P].copy(),
-        rows[SHARED + 2 * P :].copy(), np.ascontiguousarray(Y.T), label,
+        class_mass(solved, b).copy(), np.ascontiguousarray(Y.T), label,
     )  # fmt: skip
 
 

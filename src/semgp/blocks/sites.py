@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from semgp.blocks.accumulate import MASS_UNIT, PLACE_UNIT, add_hard, add_soft, chain
 from semgp.blocks.arrays import F32, F64, I32, I64, U32
 from semgp.errors import InputError
-from semgp.voxels import HALF_RANGE, VoxelTable, voxel_keys, voxel_origin
+from semgp.voxels import VoxelTable, voxel_indices, voxel_keys, voxel_origin
 
 CELL_BITS = 6
 CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
-
 
 _LARGEST_WEIGHT, _LARGEST_FEATURE = 64, 30_000
 
@@ -93,9 +92,7 @@ class Sites:
         """Positions (S, 3) in metres, world frame."""
         if self.origin is None:
             return np.empty((0, 3))
-        mask = (1 << 21) - 1
-        keys = self.voxels.keys
-        index = np.stack([keys >> 42, keys >> 21 & mask, keys & mask], axis=1) - HALF_RANGE + self.origin
+        index = voxel_indices(self.voxels.keys, self.origin)
         total = self.mass.sum(axis=1, dtype=np.int64)[:, None]
         return np.asarray((index + self.place[:, :3] / (total * float(PLACE_UNIT))) * self.resolution)
 

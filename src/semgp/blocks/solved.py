@@ -32,6 +32,12 @@ class Solved(NamedTuple):
     factor: F32
 
 
+def class_mass(solved: Solved, b: int) -> F32:
+    """Return the class masses (P, n) of the members of block b: the last rows of its coefficients."""
+    n, P = int(solved.n[b]), int(solved.n_present[b])
+    return solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(SHARED + 3 * P, n)[SHARED + 2 * P :]
+
+
 def taken(solved: Solved, blocks: I64) -> Solved:
     """Return copies of some blocks' posteriors, in this order."""
     rows = [solved.coefficients[solved.at[b] : solved.at[b + 1]] for b in blocks]

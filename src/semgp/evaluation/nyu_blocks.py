@@ -18,7 +18,7 @@ from semgp.classes import MISSING
 from semgp.cloud import LabelledCloud
 from semgp.evaluation.measure import timed
 from semgp.evaluation.nyu import METHODS, nyu_task
-from semgp.evaluation.task import Built, Method, Task, of_all
+from semgp.evaluation.task import Built, Method, Task, of_all_solved
 from semgp.gp.stationary import Matern52
 from semgp.maps.gp import GPSemanticMap
 from semgp.readers.nyu import ClassCount, NYUSource
@@ -93,10 +93,7 @@ class NYUBlocks:
 
     def _built(self, task: Task, posterior: str) -> Built:
         model, seconds = self.model(task.experiment, posterior)
-        gp_map = GPSemanticMap(task.truth.classes, model)
-        built, fit_seconds = timed(lambda: of_all(gp_map, task))
-        _, solve_seconds = timed(gp_map.solve)
-        return replace(built, fit_seconds=fit_seconds + solve_seconds, learn_seconds=seconds)
+        return of_all_solved(GPSemanticMap(task.truth.classes, model), task, seconds)
 
     def _trial(self, number: int, experiment: str) -> Trial:
         frame = self.source.read(number, self.classes)

@@ -21,7 +21,7 @@ from semgp.blocks.model import BlockModel
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.evaluation.measure import timed
-from semgp.evaluation.task import Built, Method, Task, of_all
+from semgp.evaluation.task import Built, Method, Task, of_all, of_all_solved
 from semgp.gp.stationary import Matern52
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.presets import with_vertical
@@ -111,10 +111,7 @@ def _learned(task: Task, start: BlockModel) -> Built:
     """A map of many blocks; its model is learned from the task's own labels, with the task's seed."""
     start = with_vertical(start, VERTICAL)
     (model, _), seconds = timed(lambda: learn_from_scans(task.training, start, vertical=VERTICAL, seed=task.seed))
-    gp_map = GPSemanticMap(task.truth.classes, model)
-    built, fit_seconds = timed(lambda: of_all(gp_map, task))
-    _, solve_seconds = timed(gp_map.solve)
-    return replace(built, fit_seconds=fit_seconds + solve_seconds, learn_seconds=seconds)
+    return of_all_solved(GPSemanticMap(task.truth.classes, model), task, seconds)
 
 
 METHODS: Mapping[str, Method] = {
