@@ -6,9 +6,54 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import entr
 
 from semgp.classes import MISSING, Classes
 from semgp.errors import InputError
+
+
+UNKNOWN, FREE, OCCUPIED = -1, 0, 1
+"""What a place is, see `OccupancyPrediction.state`."""
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyPrediction:
+    """Whether something is there, at M query points.
+
+    Parameters
+    ----------
+    probability : (M,) float array
+        Probability that something is there; where the place is not known, the map's prior.
+    known : (M,) bool array
+        True where rays have ended near by or passed.
+
+    Raises
+    ------
+    InputError
+        Arrays whose shapes do not agree.
+    """
+
+    probability: NDArray[np.floating]
+    known: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        if self.probability.shape != self.known.shape or self.known.ndim != 1:
+            raise InputError(
+                f"probability {self.probability.shape} and known {self.known.shape} must have one shape (M,)."
+            )
+
+    def __len__(self) -> int:
+        return len(self.known)
+
+    @property
+    def state(self) -> NDArray[np.int8]:
+        """`OCCUPIED` (1) where a known place is so with probability 1/2 or more, `FREE` (0), or `UNKNOWN` (-1)."""
+        return np.where(self.known, np.where(self.probability >= 0.5, OCCUPIED, FREE), UNKNOWN).astype(np.int8)
+
+    @property
+    def entropy(self) -> NDArray[np.floating]:
+        """Entropy (M,) of free or occupied, in nats."""
+        return np.asarray(entr(self.probability) + entr(1 - self.probability))
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +72,9 @@ class Prediction:
     mean, variance : (M, C) float array, optional
         Mean and variance of the method's own belief about each class: of the latent function for a Gaussian
         process, of the class probability for Bayesian kernel inference. None where the method has none.
+    occupancy : OccupancyPrediction, optional
+        Whether something is there, from maps that keep free space. The class probabilities are then those of what
+        is there, if something is: class c is there with probability `occupancy.probability * probability[:, c]`.
 
     Raises
     ------
@@ -39,6 +87,7 @@ class Prediction:
     observed: NDArray[np.bool_]
     mean: NDArray[np.floating] | None = None
     variance: NDArray[np.floating] | None = None
+    occupancy: OccupancyPrediction | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.observed), len(self.classes))
@@ -46,6 +95,8 @@ class Prediction:
             value = getattr(self, name)
             if value is not None and value.shape != shape:
                 raise InputError(f"{name} must have shape {shape}, not {value.shape}.")
+        if self.occupancy is not None and len(self.occupancy) != shape[0]:
+            raise InputError(f"occupancy must be of {shape[0]} points, not {len(self.occupancy)}.")
 
     def __len__(self) -> int:
         return len(self.observed)
@@ -63,5 +114,4 @@ class Prediction:
     @property
     def entropy(self) -> NDArray[np.floating]:
         """Entropy (M,) of the class probabilities, in nats."""
-        p = self.probability
-        return np.asarray(-np.where(p > 0, p * np.log(np.where(p > 0, p, 1)), 0).sum(axis=1))
+        return np.asarray(entr(self.probability).sum(axis=1))

@@ -54,6 +54,27 @@ class SemanticMap(Protocol):
         ...
 
 
+@runtime_checkable
+class SpatialMap(SemanticMap, Protocol):
+    """A semantic map that keeps free space, too: its predictions have an `occupancy`.
+
+    What planners need: see `semgp.planning`.
+    """
+
+    resolution: float
+    """Edge in metres of the voxels in which the map collects its data: what it tells apart."""
+
+    @property
+    def occupied_positions(self) -> NDArray[np.float64]:
+        """Where rays ended, (n, 3), metres, world frame: sites or voxel centres."""
+        ...
+
+    @property
+    def free_positions(self) -> NDArray[np.float64]:
+        """Where rays passed, (n, 3), metres, world frame: sites or voxel centres."""
+        ...
+
+
 def require_classes(cloud: LabelledCloud, classes: Classes) -> None:
     """Check that a cloud's labels speak of a map's classes.
 
