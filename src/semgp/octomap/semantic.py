@@ -22,8 +22,9 @@ from semgp.octomap.morton import DEPTH, OUTSIDE
 from semgp.octomap.occupancy import OccupancyMap
 from semgp.octomap.reading import read_tree
 from semgp.octomap.sensor import SensorModel, log_odds
+from semgp.octomap.sensor import probability as occupancy_probability
 from semgp.octomap.tree import Leaves, cells_at, joined, prune
-from semgp.prediction import Prediction
+from semgp.prediction import OccupancyPrediction, Prediction
 
 
 class SemanticOctoMap(OccupancyMap):
@@ -90,7 +91,8 @@ class SemanticOctoMap(OccupancyMap):
     def query(self, points: ArrayLike) -> Prediction:
         """Answer at points (M, 3), metres, world frame, with the average label of their voxels.
 
-        A point is observed if its voxel has labels; else it gets the uniform distribution.
+        A point is observed if its voxel has labels; else it gets the uniform distribution. Where no ray has told
+        whether something is there, the occupancy is 1/2.
 
         Raises
         ------
@@ -100,8 +102,11 @@ class SemanticOctoMap(OccupancyMap):
         X = query_points(points)
         if self._labels.n_labelled == 0:
             raise InputError("the map has no labels yet: update it with a labelled cloud first.")
-        probability, observed = self._labels.probability(self._codes(X), len(self.classes))
-        return Prediction(self.classes, probability, observed)
+        codes = self._codes(X)
+        probability, observed = self._labels.probability(codes, len(self.classes))
+        log_odds, known = self._bricks.find(codes)
+        occupancy = OccupancyPrediction(occupancy_probability(log_odds), known)
+        return Prediction(self.classes, probability, observed, occupancy=occupancy)
 
     def query_colours(self, points: ArrayLike) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
         """Return the mean colour (M, 3) at points (M, 3), and where there is one (M,); elsewhere it is 0."""
@@ -112,6 +117,16 @@ class SemanticOctoMap(OccupancyMap):
         """Centres (n, 3) of the voxels that have labels, metres, world frame."""
         codes = self._labels.labelled_codes
         return self._cells(Leaves(codes, np.full(len(codes), DEPTH), np.zeros(len(codes)))).centres
+
+    @property
+    def occupied_positions(self) -> NDArray[np.float64]:
+        """Centres (n, 3) of the occupied voxels, metres, world frame."""
+        return self.occupied(pruned=False).centres
+
+    @property
+    def free_positions(self) -> NDArray[np.float64]:
+        """Centres (n, 3) of the free voxels, metres, world frame."""
+        return self.free(pruned=False).centres
 
     def prune(self) -> None:
         """Give spare memory back; see `OccupancyMap.prune`."""
