@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from semgp.camera import NYU_CAMERA
+from semgp.checks import rigid_transform
 from semgp.classes import MISSING
-from semgp.cloud import rigid_transform
 from semgp.errors import InputError
 from semgp.scene import DepthCamera, LabelFaults, SyntheticRoom, SyntheticScan, synthetic_room
 from semgp.scene.raycast import BOX, CYLINDER, ELLIPSOID, Solids, cast

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from semgp.checks import rigid_transform
 from semgp.classes import MISSING
-from semgp.cloud import rigid_transform
 from semgp.errors import InputError
 from semgp.scene.furniture import Solid
 from semgp.scene.lidar import Lidar, PatchFaults

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from semgp.checks import (
+    as_array,
+    as_rows,
+    checked_confidence,
+    checked_covariances,
+    checked_labels,
+    checked_weights,
+    require_finite,
+    rigid_transform,
+)
 from semgp.classes import MISSING, Classes
 from semgp.errors import InputError
 
@@ -35,6 +46,15 @@ class LabelledCloud:
         One name a feature.
     T_world_sensor : (4, 4) array, optional
         Pose of the sensor (camera or lidar to world). Rays start at its origin.
+    confidence : (N,) array, optional
+        How much each label counts, from 0 (not at all) to 1; left out, all of them 1.
+    covariances : (N, 3, 3) array, optional
+        Covariance of each point's position, m^2, axes of the world, the pose taken as known: the sensor's noise.
+    pose_covariance : (6, 6) array, optional
+        Covariance of the pose: position (m) and small rotations about the sensor (rad), both along the axes of the
+        world, in this order, as in ROS' PoseWithCovariance. Needs `T_world_sensor`.
+    stamp : float, optional
+        When the cloud was taken, seconds.
     pixels : (N, 2) integer array, optional
         Row and column of each point in the image it came from.
     image_shape : (int, int), optional
@@ -44,7 +64,7 @@ class LabelledCloud:
     ------
     InputError
         Lengths that differ, points or features that are not finite, labels out of range, a pose that is no
-        rigid transform, or both hard and soft labels.
+        rigid transform, covariances that are none, or both hard and soft labels.
     """
 
     points: NDArray[np.float64]
@@ -55,28 +75,32 @@ class LabelledCloud:
     features: NDArray[np.floating[Any]] | None = None
     feature_names: tuple[str, ...] = ()
     T_world_sensor: NDArray[np.float64] | None = None
+    confidence: NDArray[np.float32] | None = None
+    covariances: NDArray[np.float64] | None = None
+    pose_covariance: NDArray[np.float64] | None = None
+    stamp: float | None = None
     pixels: NDArray[np.int32] | None = None
     image_shape: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
-        points = _array("points", self.points, np.float64)
+        points = as_array("points", self.points, np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"points must have shape (N, 3), not {points.shape}.")
-        _require_finite("points", points)
+        require_finite("points", points)
         n, c = len(points), len(self.classes)
         set_field = object.__setattr__
         set_field(self, "points", points)
         if self.labels is not None and self.weights is not None:
             raise InputError("give hard labels or soft weights, not both.")
         if self.labels is not None:
-            set_field(self, "labels", _checked_labels(self.labels, n, c))
+            set_field(self, "labels", checked_labels(self.labels, n, c))
         if self.weights is not None:
-            set_field(self, "weights", _checked_weights(self.weights, n, c))
+            set_field(self, "weights", checked_weights(self.weights, n, c))
         if self.colours is not None:
-            set_field(self, "colours", _rows("colours", self.colours, n, 3, np.uint8))
+            set_field(self, "colours", as_rows("colours", self.colours, n, 3, np.uint8))
         if self.features is not None:
-            features = _rows("features", self.features, n, None, np.float32)
-            _require_finite("features", features)
+            features = as_rows("features", self.features, n, None, np.float32)
+            require_finite("features", features)
             set_field(self, "features", features)
             names = self.feature_names or tuple(f"feature {f}" for f in range(features.shape[1]))
             if len(names) != features.shape[1]:
@@ -84,8 +108,20 @@ class LabelledCloud:
             set_field(self, "feature_names", tuple(names))
         if self.T_world_sensor is not None:
             set_field(self, "T_world_sensor", rigid_transform("T_world_sensor", self.T_world_sensor))
+        if self.confidence is not None:
+            set_field(self, "confidence", checked_confidence(self.confidence, n))
+        if self.covariances is not None:
+            set_field(self, "covariances", checked_covariances("covariances", self.covariances, (n, 3, 3)))
+        if self.pose_covariance is not None:
+            if self.T_world_sensor is None:
+                raise InputError("a pose_covariance needs T_world_sensor, the pose that it is of.")
+            set_field(
+                self, "pose_covariance", checked_covariances("pose_covariance", self.pose_covariance, (6, 6))
+            )
+        if self.stamp is not None and not math.isfinite(self.stamp):
+            raise InputError(f"stamp must be a time in seconds, not {self.stamp}.")
         if self.pixels is not None:
-            set_field(self, "pixels", _rows("pixels", self.pixels, n, 2, np.int32))
+            set_field(self, "pixels", as_rows("pixels", self.pixels, n, 2, np.int32))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -103,6 +139,8 @@ class LabelledCloud:
             weights=pick(self.weights),
             colours=pick(self.colours),
             features=pick(self.features),
+            confidence=pick(self.confidence),
+            covariances=pick(self.covariances),
             pixels=pick(self.pixels),
         )
 
@@ -135,73 +173,23 @@ class LabelledCloud:
         return w
 
     @property
+    def position_covariances(self) -> NDArray[np.float64] | None:
+        """Covariances (N, 3, 3) of the positions, sensor noise and pose together; None where neither is known.
+
+        To first order a point x moves by J (dt, dr), J = [I, -[x - t]_x], when a pose with position t moves by dt
+        and turns about the world's axes by dr.
+        """
+        if self.pose_covariance is None or self.origin is None:
+            return self.covariances
+        x, y, z = (self.points - self.origin).T
+        J = np.zeros((len(self), 3, 6))
+        J[:, 0, 0] = J[:, 1, 1] = J[:, 2, 2] = 1
+        J[:, 0, 4], J[:, 0, 5], J[:, 1, 3] = z, -y, -z
+        J[:, 1, 5], J[:, 2, 3], J[:, 2, 4] = x, y, -x
+        moved = J @ self.pose_covariance @ np.swapaxes(J, 1, 2)
+        return moved if self.covariances is None else moved + self.covariances
+
+    @property
     def origin(self) -> NDArray[np.float64] | None:
         """Position (3,) of the sensor in the world, or None where the pose is not known."""
         return None if self.T_world_sensor is None else self.T_world_sensor[:3, 3]
-
-
-def rigid_transform(name: str, T: ArrayLike) -> NDArray[np.float64]:
-    """Check a rigid transform, shape (4, 4), and return it as float64.
-
-    Raises
-    ------
-    InputError
-        Wrong shape, entries that are not finite, or a rotation part that is not a rotation.
-    """
-    T = _array(name, T, np.float64)
-    if T.shape != (4, 4):
-        raise InputError(f"{name} must have shape (4, 4), not {T.shape}.")
-    _require_finite(name, T)
-    R = T[:3, :3]
-    if (
-        not np.allclose(R @ R.T, np.eye(3), atol=1e-3)
-        or np.linalg.det(R) < 0
-        or not np.allclose(T[3], (0, 0, 0, 1))
-    ):
-        raise InputError(f"{name} is no rigid transform: its last row must be 0 0 0 1, its 3 x 3 part a rotation.")
-    return T
-
-
-def _array(name: str, a: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
-    try:
-        return np.ascontiguousarray(a, dtype=dtype)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be an array of numbers: {error}.") from error
-
-
-def _rows(name: str, a: ArrayLike, n: int, width: int | None, dtype: type[np.generic]) -> NDArray[Any]:
-    a = _array(name, a, dtype)
-    if a.ndim != 2 or len(a) != n or (width is not None and a.shape[1] != width):
-        raise InputError(f"{name} must have shape ({n}, {width or 'F'}) to go with {n} points, not {a.shape}.")
-    return a
-
-
-def _require_finite(name: str, a: NDArray[Any]) -> None:
-    finite = np.isfinite(a).all(axis=tuple(range(1, a.ndim)))
-    if not finite.all():
-        raise InputError(
-            f"{name} has NaN or infinite values in {np.count_nonzero(~finite)} of {len(a)} rows, "
-            f"first in row {np.argmin(finite)}: drop them, for example with np.isfinite({name}).all(axis=1)."
-        )
-
-
-def _checked_labels(labels: ArrayLike, n: int, n_classes: int) -> NDArray[np.int32]:
-    raw = np.asarray(labels)
-    if raw.ndim != 1 or len(raw) != n:
-        raise InputError(f"labels must have shape ({n},) to go with {n} points, not {raw.shape}.")
-    if raw.dtype.kind not in "iub" and n:
-        raise InputError(f"labels must be whole numbers, not {raw.dtype}; a missing label is {MISSING}.")
-    if n and (raw.min() < MISSING or raw.max() >= n_classes):
-        raise InputError(
-            f"labels go from {raw.min()} to {raw.max()}, but with {n_classes} classes they must lie "
-            f"between 0 and {n_classes - 1}, or be {MISSING} where missing."
-        )
-    return np.ascontiguousarray(raw, dtype=np.int32)
-
-
-def _checked_weights(weights: ArrayLike, n: int, n_classes: int) -> NDArray[np.float32]:
-    w = _rows("weights", weights, n, n_classes, np.float32)
-    _require_finite("weights", w)
-    if (w < 0).any():
-        raise InputError("weights (soft labels) must not be negative.")
-    return w

@@ -11,7 +11,6 @@ from scipy.special import entr
 from semgp.classes import MISSING, Classes
 from semgp.errors import InputError
 
-
 UNKNOWN, FREE, OCCUPIED = -1, 0, 1
 """What a place is, see `OccupancyPrediction.state`."""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.cloud import rigid_transform
+from semgp.checks import rigid_transform
 from semgp.errors import InputError
 
 Z_UP = (0.0, 0.0, 1.0)

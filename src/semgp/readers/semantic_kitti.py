@@ -9,7 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.cloud import LabelledCloud, rigid_transform
+from semgp.checks import rigid_transform
+from semgp.cloud import LabelledCloud
 from semgp.conventions import SEMANTIC_KITTI, labels_from_semantic_kitti
 from semgp.errors import FileFormatError, InputError
 from semgp.readers.protocol import Scans
