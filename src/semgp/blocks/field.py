@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semgp.blocks.answer import Answers, answer_pairs, answer_prior, prior_probabilities
 from semgp.blocks.arrays import F32, F64, I32, I64
@@ -57,6 +60,17 @@ class Field:
         touched = self.sites.add(points, labels, weights, features)
         self.touch(touched)
 
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Fill a new field with sites that `Sites.to_arrays` gave.
+
+        Raises
+        ------
+        InputError
+            Sites that are damaged.
+        """
+        self.sites.restore(arrays)
+        self.touch(np.arange(len(self.sites.cells), dtype=np.int32))
+
     def touch(self, cells: I32) -> None:
         """Have cells and those round about solved again when next needed."""
         self.store.grow(len(self.sites.cells), stale=False)
@@ -107,6 +121,9 @@ class Field:
 
     def query(self, points: F64, features: F32, tolerance: float = 0.0) -> Answers:
         """Answer at points (M, 3) with features (M, F), NaN where unknown; stale blocks are solved first."""
+        if self.sites.origin is None:
+            nothing = np.broadcast_to(self._unknown[: self._n_classes], (len(points), self._n_classes))
+            return Answers(nothing, np.full(len(points), self.prior_variance, np.float32))
         half = self.model.blend / 2
         self._solve_round(points, half, tolerance)
         origin, trees = self._origin(), self.store.trees(self.sites.cells)

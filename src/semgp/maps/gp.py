@@ -15,6 +15,8 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
 from semgp.maps.blocks import ManyBlocks
+from semgp.maps.free_space import FreeSpace
+from semgp.maps.occupancy import FREE, OCCUPIED, Occupancy
 from semgp.maps.presets import GENERAL
 from semgp.maps.protocol import query_points, require_classes
 from semgp.maps.whole import WholeScan
@@ -40,23 +42,31 @@ class GPSemanticMap:
         For live maps: cells of a block map whose sites have changed by less than this on average since they were
         last solved are left as they are. At 0, answers are exact, whatever the order of updates. Around 0.2, a
         label changed in five or the number of labels grown by half, saves most of the work of a scan.
+    free : FreeSpace, optional
+        For block maps that keep free space, too, from the rays of clouds with a pose. Predictions then have an
+        `occupancy`: class c is there with probability `occupancy.probability * probability[:, c]`.
 
     Raises
     ------
     InputError
-        A model for another number of classes, or a tolerance that is negative.
+        A model for another number of classes, a tolerance that is negative, or free space for a `GPModel`.
     """
 
     kind = "gp"
 
     def __init__(
-        self, classes: Classes, model: BlockModel | GPModel | None = None, tolerance: float = 0.0
+        self,
+        classes: Classes,
+        model: BlockModel | GPModel | None = None,
+        tolerance: float = 0.0,
+        *,
+        free: FreeSpace | None = None,
     ) -> None:
         if not (math.isfinite(tolerance) and tolerance >= 0):
             raise InputError(f"the tolerance must be a number, 0 or above, not {tolerance}.")
         self.classes = classes
         self.model = GENERAL if model is None else model
-        self._state = _state(classes, self.model)
+        self._state = _state(classes, self.model, free)
         if isinstance(self._state, ManyBlocks):
             self._state.tolerance = tolerance
 
@@ -66,7 +76,7 @@ class GPSemanticMap:
         Raises
         ------
         InputError
-            Classes that differ from the map's, features that are missing, or points too far from the first.
+            Classes that differ from the map's, features or a pose missing, or points too far from the first.
         """
         require_classes(cloud, self.classes)
         self._state.add(cloud)
@@ -114,6 +124,54 @@ class GPSemanticMap:
         return part
 
     @property
+    def resolution(self) -> float:
+        """Edge in metres of the voxels in which a block map collects its labels.
+
+        Raises
+        ------
+        InputError
+            The paper's map, which has none.
+        """
+        if not isinstance(self.model, BlockModel):
+            raise InputError("a map of one training set has no resolution: give GPSemanticMap a BlockModel.")
+        return self.model.resolution
+
+    @property
+    def free(self) -> FreeSpace | None:
+        """How free space is kept, None where it is not."""
+        occupancy = self._state.occupancy if isinstance(self._state, ManyBlocks) else None
+        return None if occupancy is None else occupancy.free
+
+    @property
+    def occupied_positions(self) -> NDArray[np.float64]:
+        """Sites (n, 3) at which most rays ended, metres, world frame.
+
+        Raises
+        ------
+        InputError
+            A map that keeps no free space.
+        """
+        return self._occupancy.positions(OCCUPIED)
+
+    @property
+    def free_positions(self) -> NDArray[np.float64]:
+        """Sites (n, 3) that most rays passed, metres, world frame.
+
+        Raises
+        ------
+        InputError
+            A map that keeps no free space.
+        """
+        return self._occupancy.positions(FREE)
+
+    @property
+    def _occupancy(self) -> Occupancy:
+        occupancy = self._state.occupancy if isinstance(self._state, ManyBlocks) else None
+        if occupancy is None:
+            raise InputError("the map keeps no free space: make it with GPSemanticMap(..., free=FreeSpace()).")
+        return occupancy
+
+    @property
     def positions(self) -> NDArray[np.float64]:
         """Sites or labelled points (n, 3), metres."""
         return self._state.positions
@@ -147,9 +205,11 @@ class GPSemanticMap:
         return made
 
 
-def _state(classes: Classes, model: BlockModel | GPModel) -> ManyBlocks | WholeScan:
+def _state(classes: Classes, model: BlockModel | GPModel, free: FreeSpace | None) -> ManyBlocks | WholeScan:
     if isinstance(model, BlockModel):
-        return ManyBlocks(classes, model)
+        return ManyBlocks(classes, model, free)
+    if free is not None:
+        raise InputError("free space needs a map of many blocks: give GPSemanticMap a BlockModel.")
     if isinstance(model, GPModel):
         return WholeScan(classes, model)
     raise InputError(f"the model must be a BlockModel or a GPModel, not {type(model).__name__}.")

@@ -1,0 +1,99 @@
+"""Occupancy: a field of two classes, free and occupied, from the rays of clouds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgp.blocks.field import Field
+from semgp.cloud import LabelledCloud
+from semgp.errors import InputError
+from semgp.maps.free_space import FreeSpace
+from semgp.maps.rays import Walk, free_samples
+from semgp.prediction import OccupancyPrediction
+from semgp.voxels import VoxelTable, voxel_keys, voxel_origin
+
+F64, I32, I64 = NDArray[np.float64], NDArray[np.int32], NDArray[np.int64]
+
+FREE, OCCUPIED = 0, 1
+"""The classes of the field."""
+
+KNOWN = 0.95
+"""A point whose latent variance is above this share of the prior's is neither known to be free nor occupied."""
+
+
+class Rays(NamedTuple):
+    """What a cloud tells of space: points (n, 3) with labels (n,) `FREE` or `OCCUPIED`, one a voxel."""
+
+    points: F64
+    labels: I32
+
+
+class Occupancy:
+    """Where something is and where nothing is.
+
+    Parameters
+    ----------
+    free : FreeSpace
+        The settings, with a model.
+    """
+
+    def __init__(self, free: FreeSpace) -> None:
+        assert free.model is not None
+        self.free, self.model = free, free.model
+        self.field = Field(self.model, 2)
+
+    def add(self, rays: Rays) -> None:
+        """Add what `sample` gave."""
+        weights = np.diag([self.free.weight, 1.0]).astype(np.float32)[rays.labels]
+        self.field.add(rays.points, None, weights, np.empty((len(rays.points), 0), dtype=np.float32))
+
+    def sample(self, cloud: LabelledCloud) -> Rays:
+        """Return the points of a cloud, as occupied, and samples along its rays, as free.
+
+        Raises
+        ------
+        InputError
+            A cloud without a pose, or points beyond the reach of the map.
+        """
+        sensor, free, resolution = cloud.origin, self.free, self.model.resolution
+        if sensor is None:
+            raise InputError("the cloud has no T_world_sensor, and rays begin at the sensor: give its pose.")
+        if not len(cloud):
+            return Rays(np.empty((0, 3)), np.empty(0, dtype=np.int32))
+        sites = self.field.sites
+        origin = voxel_origin(sensor[None], resolution) if sites.origin is None else sites.origin
+        voxel_keys(
+            sensor[None], resolution, origin
+        )  # samples lie between sensor and points: both must be in range
+        reach = np.inf if free.reach is None else free.reach
+        hits = cloud.points[((cloud.points - sensor) ** 2).sum(axis=1) <= reach**2]
+        walk = Walk(
+            resolution, origin.astype(np.float64), free.rays / len(cloud), free.seed, free.margin * resolution,
+            free.near * resolution, free.thin, reach,
+        )  # fmt: skip
+        samples, keys, _ = free_samples(sensor, cloud.points, walk, sites.voxels, np.empty(0, dtype=bool))
+        table = VoxelTable()
+        at_hits = _first(table, voxel_keys(hits, resolution, origin))
+        at_samples = _first(table, keys)
+        points = np.concatenate([hits[at_hits], samples[at_samples]])
+        return Rays(points, np.repeat(np.array([OCCUPIED, FREE], np.int32), [len(at_hits), len(at_samples)]))
+
+    def answer(self, X: F64, tolerance: float = 0.0) -> OccupancyPrediction:
+        """Return what is known at points (M, 3)."""
+        answers = self.field.query(X, np.empty((len(X), 0), dtype=np.float32), tolerance)
+        known = answers.variance < KNOWN * self.field.prior_variance
+        return OccupancyPrediction(answers.probability[:, OCCUPIED], known)
+
+    def positions(self, label: int) -> F64:
+        """Return the sites (n, 3) at most of whose sightings the label, `FREE` or `OCCUPIED`, was right."""
+        mass = self.field.sites.mass
+        return self.field.sites.positions[mass[:, label] > mass[:, 1 - label]]
+
+
+def _first(table: VoxelTable, keys: I64) -> I64:
+    """Return where keys come up for the first time, and insert them."""
+    newest = np.maximum.accumulate(np.concatenate([[len(table) - 1], table.insert(keys)]))
+    return np.flatnonzero(np.diff(newest) > 0)
