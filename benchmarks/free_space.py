@@ -3,8 +3,8 @@
     uv run benchmarks/free_space.py DATA
 
 DATA is the folder that holds `semantickitti_08` and `nyu`. On SemanticKITTI the map is built from the scans; of an
-NYU frame, whose pixels are one view, ten interleaved parts stand for ten scans. Voxels of which the OctoMap is certain
-are those whose log-odds have reached a clamp. The scan held out is asked at a point on each of many rays, drawn evenly
+NYU frame, whose pixels are one view, ten interleaved parts stand for ten scans. The OctoMap is certain of voxels
+whose log-odds have reached a clamp. The scan held out is asked at a point on each of many rays, drawn evenly
 between sensor and one voxel before the end (free), and at the ends (occupied).
 """
 

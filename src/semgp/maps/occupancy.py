@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F64, I32, I64
 from semgp.blocks.field import Field
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
@@ -14,8 +14,6 @@ from semgp.maps.free_space import FreeSpace
 from semgp.maps.rays import Walk, free_samples
 from semgp.prediction import OccupancyPrediction
 from semgp.voxels import VoxelTable, voxel_keys, voxel_origin
-
-F64, I32, I64 = NDArray[np.float64], NDArray[np.int32], NDArray[np.int64]
 
 FREE, OCCUPIED = 0, 1
 """The classes of the field."""

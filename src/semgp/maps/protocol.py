@@ -61,8 +61,10 @@ class SpatialMap(SemanticMap, Protocol):
     What planners need: see `semgp.planning`.
     """
 
-    resolution: float
-    """Edge in metres of the voxels in which the map collects its data: what it tells apart."""
+    @property
+    def resolution(self) -> float:
+        """Edge in metres of the voxels in which the map collects its data: what it tells apart."""
+        ...
 
     @property
     def occupied_positions(self) -> NDArray[np.float64]:

@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from semgp.blocks.arrays import F64, I64, Bool
 from semgp.parallel import n_workers, parallel_map, slices
 from semgp.voxels import AXIS_BITS, HALF_RANGE, STEP, VoxelTable, slot_of
-
-F64, I64, Bool = NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]
 
 _HASH = np.uint64(0x9E3779B97F4A7C15)
 
@@ -20,8 +18,8 @@ class Walk(NamedTuple):
     """How rays are walked; lengths in metres.
 
     resolution: edge of a voxel, and the step along a ray. origin (3,): voxel at the origin of the keys. share: of
-    the rays, drawn by hashing them with the seed. margin: how far before its end a ray is last sampled. near: within
-    this length of its end every sample counts. thin: farther out only samples in one voxel in so many count, in the
+    the rays, drawn by a hash with the seed. margin: how far before its end a ray is last sampled. near: within
+    this length of its end every sample counts. thin: farther out only those in one voxel in so many count, in the
     same ones for every ray. reach: rays are cut at this length.
     """
 
