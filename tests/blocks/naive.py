@@ -54,7 +54,8 @@ def street(seed: int, n: int, n_classes: int) -> tuple[Array, NDArray[np.int32]]
 
 
 def block_of(solved: Solved, b: int, n_classes: int) -> Block:
-    found = patch(solved, b, np.empty((0, solved.X.shape[1]), np.float32), np.empty(0, np.int32))
+    nothing = np.empty((0, solved.X.shape[1]), np.float32)
+    found = patch(solved, b, nothing, np.empty((0, 3), np.float32), np.empty(0, np.int32))
     mass = np.zeros((len(found.k), n_classes))
     mass[:, found.present] = found.mass.T
     return Block(found.X.T.astype(np.float64), mass, found.k.astype(np.float64))

@@ -211,7 +211,8 @@ def test_error_frequencies() -> None:
     Y = np.array([[0, 1, 5, 4], [0, 0, 0, 0], [0, 0, 0, 0]], dtype=np.float32)
     mass = np.array([[2, 0.5], [1, 3], [9, 0]], dtype=np.float32)  # the third row: of no class
     label = np.array([0, 0, 2, 1], dtype=np.int32)
-    patch = Patch(X, np.ones(2, np.float32), np.array([0, 2, 3], np.int16), mass, Y, label)
+    S, SY = np.empty((0, 2), np.float32), np.empty((0, 4), np.float32)
+    patch = Patch(X, S, np.ones(2, np.float32), np.array([0, 2, 3], np.int16), mass, Y, SY, label)
     assert error_frequencies([patch], 3) == pytest.approx([1 / 6, 1 / 2 + 1 / 6, 1 / 6])
     right = patch._replace(label=np.array([0, 0, 2, 2], np.int32))
     assert error_frequencies([right], 3) == pytest.approx([1 / 3] * 3)

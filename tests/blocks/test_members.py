@@ -108,7 +108,9 @@ def test_members(leaf: int, near: int, far: int) -> None:
     C, room = len(s.sites), 4 * sizes.total + 1
     for i in range(len(layout.cells)):
         for own in (*_leaves(layout, i, leaf), np.empty(0, np.int64)):
-            out = Members(*(np.full(shape, np.nan, np.float32) for shape in ((3, room), (room, C), room)))
+            out = Members(
+                *(np.full(shape, np.nan, np.float32) for shape in ((3, room), (0, room), (room, C), room))
+            )
             n = gather(layout, s.around[i], own, EDGE, sizes, marks, mark, out)
             mark += 1
             assert n <= sizes.total

@@ -50,7 +50,8 @@ def patches(model: BlockModel) -> list[Patch]:
         mass = rng.dirichlet(np.full(len(present), 0.7), n).T * rng.integers(1, 9, n)
         X, Y = (rng.uniform(0, 2, (n_dims, m)).astype(np.float32) for m in (n, 12))
         k, labels = rng.integers(1, 5, n).astype(np.float32), rng.integers(0, C, 12).astype(np.int32)
-        made.append(Patch(X, k, np.array(present, np.int16), mass.astype(np.float32), Y, labels))
+        S, SY = np.empty((0, n), np.float32), np.empty((0, 12), np.float32)
+        made.append(Patch(X, S, k, np.array(present, np.int16), mass.astype(np.float32), Y, SY, labels))
     return made
 
 

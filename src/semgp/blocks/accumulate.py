@@ -16,6 +16,9 @@ PLACE_UNIT = 1 << 24
 FEATURE_UNIT = 1 << 16
 """Steps of a feature of 1."""
 
+SPREAD_UNIT = 1 << 24
+"""Steps of a variance of 1 m^2."""
+
 _FULL = 1 << 31
 """Mass of a site, half a million labels, beyond which labels change nothing and are not added: sums never wrap."""
 
@@ -40,6 +43,7 @@ def chain(
 def add_hard(
     rows: I64,
     labels: I32,
+    amounts: I64,
     points: F64,
     resolution: float,
     features: F32,
@@ -48,22 +52,28 @@ def add_hard(
     place: I64,
     drift: F64,
 ) -> None:
-    """Add one label to each row's site; see `semgp.blocks.sites.Sites` for `drift`."""
+    """Add a label to each row's site, of a mass `amounts` (N,); see `semgp.blocks.sites.Sites` for `drift`.
+
+    Where a site is full, the amount is set to 0.
+    """
     for i in range(len(rows)):
         r, total = rows[i], np.int64(0)
         for c in range(mass.shape[1]):
             total += np.int64(mass[r, c])
         if total > _FULL:
+            amounts[i] = 0
             continue
-        drift[cell[r]] += (1.5 - mass[r, labels[i]] / total) * MASS_UNIT / (total + MASS_UNIT) if total else 1.0
-        mass[r, labels[i]] += np.uint32(MASS_UNIT)
-        _add_place(r, MASS_UNIT, points[i], resolution, features[i], place)
+        w = amounts[i]
+        drift[cell[r]] += (1.5 - mass[r, labels[i]] / total) * w / (total + w) if total else 1.0
+        mass[r, labels[i]] += np.uint32(w)
+        _add_place(r, w, points[i], resolution, features[i], place)
 
 
 @njit(cache=True, nogil=True)
 def add_soft(
     rows: I64,
     weights: F32,
+    amounts: I64,
     points: F64,
     resolution: float,
     features: F32,
@@ -72,25 +82,41 @@ def add_soft(
     place: I64,
     drift: F64,
 ) -> None:
-    """Add class weights (N, C) to each row's site, and what they lack to one to a column more."""
+    """Add class weights (N, C) to each row's site, and fill in their sums `amounts` (N,).
+
+    Where sites have a column more than there are classes, what the weights lack to `amounts` as given goes there.
+    """
     for i in range(len(rows)):
         r, total, added, agreed = rows[i], np.int64(0), np.int64(0), 0.0
         for c in range(mass.shape[1]):
             total += np.int64(mass[r, c])
         if total > _FULL:
+            amounts[i] = 0
             continue
         for c in range(mass.shape[1]):
-            # what the classes lack to one is the mass of the last column, where there is one more than classes
-            w = np.int64(max(MASS_UNIT - int(added), 0))
+            w = max(amounts[i] - added, np.int64(0))
             if c < weights.shape[1]:
                 w = np.int64(np.rint(weights[i, c] * MASS_UNIT))
             added += w
             agreed += float(w) * float(mass[r, c])
             mass[r, c] += np.uint32(w)
+        amounts[i] = added
         drift[cell[r]] += (
             (1.5 - agreed / (float(total) * float(added))) * added / (total + added) if total else 1.0
         )
         _add_place(r, added, points[i], resolution, features[i], place)
+
+
+@njit(cache=True, nogil=True)
+def add_spread(rows: I64, amounts: I64, variances: F64, spread: I64) -> None:
+    """Add mass times variance (N, 3) to each row's sums, and one scan to those of each site that it saw."""
+    seen = np.zeros(len(spread), np.bool_)
+    for i in range(len(rows)):
+        r = rows[i]
+        for d in range(3):
+            spread[r, d] += amounts[i] * int(np.rint(variances[i, d] * SPREAD_UNIT))
+        spread[r, 3] += not seen[r]
+        seen[r] = True
 
 
 @njit(cache=True, nogil=True)

@@ -8,11 +8,12 @@ import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F32, I16, I64
-from semgp.blocks.covariance import Mixture, covariance_tile
+from semgp.blocks.covariance import Mixture
 from semgp.blocks.linear import unpack
 from semgp.blocks.link import Link, class_probabilities, error_shares
 from semgp.blocks.pairs import Pairs
 from semgp.blocks.solved import SHARED, Solved
+from semgp.blocks.uncertain import cross_covariance
 
 TILE = 64
 """Points that are answered together: their covariances with a block stay in the cache."""
@@ -66,7 +67,7 @@ def answer_pairs(
     prior_variance = np.float32(0)
     for k in range(len(kernel.variance)):
         prior_variance += kernel.variance[k]
-    L_flat = np.empty(T * T, np.float32)
+    L_flat, certain = np.empty(T * T, np.float32), np.empty((0, TILE), np.float32)
     unpacked = -1
     begin = 0
     while begin < len(order):
@@ -85,7 +86,7 @@ def answer_pairs(
             if D > 3:
                 _fill_features(X, q, features[pairs.point[pair]], Z, n)
         K = K_flat[: m * n].reshape(m, n)  # a row has all members, whole vectors, however few the points
-        covariance_tile(X, m, Z, n, kernel, K, work)
+        cross_covariance(X, certain, m, Z, solved.S[b], n, kernel, K, work)
         F = F_flat[: W * m].reshape(W, m)
         np.dot(solved.coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n), K.T, F)
         if solved.at_factor[b + 1] > solved.at_factor[b]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from semgp.blocks.field import Field
-from semgp.blocks.inputs import add_cloud, cloud_features
+from semgp.blocks.inputs import add_cloud, cloud_features, cloud_variances
 from semgp.blocks.model import BlockModel
 from semgp.blocks.patches import Patch, patch
 from semgp.cloud import LabelledCloud
@@ -39,6 +39,7 @@ def draw_patches(
     points = np.concatenate([c.points for c in labelled])
     labels = np.concatenate([c.hard_labels for c in labelled])
     features = np.concatenate([cloud_features(c, model.features) for c in labelled])
+    variances = np.concatenate([cloud_variances(c) for c in labelled])
     if not len(points) or not len(field.sites):
         return []
     shuffled = rng.permutation(len(points))
@@ -55,5 +56,5 @@ def draw_patches(
             if piece is not None and len(here) and piece.solved.n[place]:
                 rows = shuffled[here]
                 Y = np.concatenate([local[here], features[rows]], axis=1)
-                patches.append(patch(piece.solved, int(place), Y, labels[rows]))
+                patches.append(patch(piece.solved, int(place), Y, variances[rows], labels[rows]))
     return patches

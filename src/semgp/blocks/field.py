@@ -14,12 +14,13 @@ from semgp.blocks.arrays import F32, F64, I32, I64
 from semgp.blocks.covariance import mixture
 from semgp.blocks.expert_answer import answer_by_experts
 from semgp.blocks.layout import around_keys, lay_out, neighbours
-from semgp.blocks.model import EXPERTS, BlockModel
+from semgp.blocks.model import CLOSED, EXPERTS, BlockModel
 from semgp.blocks.pairs import CellTrees, find_pairs, home_blocks, mark_cells
 from semgp.blocks.sites import CELL, Sites
 from semgp.blocks.solve import solve_cells
 from semgp.blocks.solved import Solved
 from semgp.blocks.store import BlockStore, sorted_by
+from semgp.errors import InputError
 from semgp.parallel import n_workers, parallel_map, slices
 
 _SLICE = 16_384
@@ -49,15 +50,29 @@ class Field:
         self._unknown = prior_probabilities(self._link, n_classes) if pooled else self._link.prior
         self.prior_variance = float(self._kernel.variance.sum())
 
-    def add(self, points: F64, labels: I32 | None, weights: F32 | None, features: F32) -> None:
-        """Add labelled points; the blocks that they reach are solved again when next needed.
+    def add(
+        self,
+        points: F64,
+        labels: I32 | None,
+        weights: F32 | None,
+        features: F32,
+        confidence: F32 | None = None,
+        variances: F64 | None = None,
+    ) -> None:
+        """Add labelled points, see `Sites.add`; the blocks that they reach are solved again when next needed.
 
         Raises
         ------
         InputError
-            Points a million voxels from the first, or weights or features beyond what a site can hold.
+            Points a million voxels from the first, numbers beyond what a site can hold, or uncertain positions for
+            experts.
         """
-        touched = self.sites.add(points, labels, weights, features)
+        if variances is not None and self.model.posterior in EXPERTS:
+            raise InputError(
+                f"blocks of {self.model.posterior} experts take positions as certain: leave covariances out, or "
+                f"use one of {', '.join(CLOSED)}."
+            )
+        touched = self.sites.add(points, labels, weights, features, confidence, variances)
         self.touch(touched)
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

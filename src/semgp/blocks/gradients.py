@@ -12,11 +12,12 @@ import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F32, F64, I16, I32
-from semgp.blocks.covariance import Mixture, covariance_tile, derivative_tile
+from semgp.blocks.covariance import Mixture
 from semgp.blocks.link import Link, class_probabilities
 from semgp.blocks.patches import Packed
 from semgp.blocks.solve import Noise, solve_block
 from semgp.blocks.solved import SHARED
+from semgp.blocks.uncertain import cross_covariance, cross_derivative, member_derivative
 
 
 class Gradient(NamedTuple):
@@ -41,10 +42,13 @@ def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, li
     rows_flat, G_flat = np.empty(W_most * n_most, np.float32), np.empty(W_most * m_most, np.float32)
     F_flat, p_flat, work = np.empty_like(G_flat), np.empty_like(G_flat), np.empty(wide, np.float32)
     at_X = at_k = at_present = at_mass = at_Y = at_label = 0
+    U, V = (4, 3) if len(patches.S) else (0, 0)
     for b in range(len(patches.sizes)):
         n, P, m = patches.sizes[b, 0], patches.sizes[b, 1], patches.sizes[b, 2]
         X = patches.X[at_X : at_X + n_dims * n].reshape(n_dims, n)
         Y = patches.Y[at_Y : at_Y + n_dims * m].reshape(n_dims, m)
+        S = patches.S[at_k * U : (at_k + n) * U].reshape(U, n)
+        SY = patches.SY[at_label * V : (at_label + m) * V].reshape(V, m)
         k, label = patches.k[at_k : at_k + n], patches.label[at_label : at_label + m]
         present = patches.present[at_present : at_present + P]
         W = SHARED + 3 * P
@@ -55,26 +59,26 @@ def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, li
             rows[2 + 2 * P] += rows[SHARED + 2 * P + p]
         L_inverse = factor[: n * n].reshape(n, n)
         if noise.solve:
-            solve_block(X, k, n, present, kernel, noise, rows, L_inverse, K, work)
+            solve_block(X, S, k, n, present, kernel, noise, rows, L_inverse, K, work)
         else:
             rows[: 2 + 2 * P] = 0
         cross = K[: n * m].reshape(n, m)
-        covariance_tile(X, n, Y, m, kernel, cross, work)
+        cross_covariance(X, S, n, Y, SY, m, kernel, cross, work)
         F, G = F_flat[: W * m].reshape(W, m), G_flat[: W * m].reshape(W, m)
         np.dot(rows, cross, F)
         prob = p_flat[: (P + 1) * m].reshape(P + 1, m)
         class_probabilities(F, present, m, link, prob)
         out.loss[0] += _link_gradient(F, prob, present, label, link, G, out.link)
         H = np.dot(np.ascontiguousarray(rows.T), G)
-        derivative_tile(X, n, Y, m, kernel, H, 1.0, out.kernel, work)
+        cross_derivative(X, S, n, Y, SY, m, kernel, H, 1.0, out.kernel, work)
         if noise.solve:
             B = np.dot(L_inverse.T, np.dot(L_inverse, cross))
             # minus dL/dA: the votes, in the last rows, do not depend on A
             H_solved = np.dot(np.ascontiguousarray(rows[: 2 + 2 * P].T), G[: 2 + 2 * P])
-            S = np.dot(H_solved, np.ascontiguousarray(B.T))
-            derivative_tile(X, n, X, n, kernel, S, -1.0, out.kernel, work)
+            dA = np.dot(H_solved, np.ascontiguousarray(B.T))
+            member_derivative(X, S, n, kernel, dA, -1.0, out.kernel, work)
             G_rows = np.dot(G, np.ascontiguousarray(B.T))
-            _noise_gradient(S, G_rows, rows, k, present, noise, out.noise)
+            _noise_gradient(dA, G_rows, rows, k, present, noise, out.noise)
         at_X, at_k, at_present = at_X + n_dims * n, at_k + n, at_present + P
         at_mass, at_Y, at_label = at_mass + P * n, at_Y + n_dims * m, at_label + m
 
@@ -156,13 +160,13 @@ def _score_slope(score: F64, y: int, link: Link, share: float, slope: F64, g: F6
 
 
 @njit(cache=True, nogil=True)
-def _noise_gradient(S: F32, G_rows: F32, rows: F32, k: F32, present: I16, noise: Noise, g: F64) -> None:
-    """Add the derivatives in s_n, nugget and a; S is minus dL/dA, G_rows is dL/dY."""
+def _noise_gradient(dA: F32, G_rows: F32, rows: F32, k: F32, present: I16, noise: Noise, g: F64) -> None:
+    """Add the derivatives in s_n, nugget and a; dA is minus dL/dA, G_rows is dL/dY."""
     P, a = len(present), noise.a
     for j in range(len(k)):
         total = rows[2 + 2 * P, j]
-        g[0] -= S[j, j] / total
-        g[1] -= S[j, j] / k[j]
+        g[0] -= dA[j, j] / total
+        g[1] -= dA[j, j] / k[j]
         g[2] += G_rows[1, j] * (1 / a - 1 / (total + a))
         for p in range(P):
             mass, pi = rows[SHARED + 2 * P + p, j], noise.prior[present[p]]

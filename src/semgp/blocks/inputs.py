@@ -21,11 +21,25 @@ def add_cloud(field: Field, cloud: LabelledCloud) -> None:
         A cloud without the features that the model asks for, or points a million voxels from the first.
     """
     keep = cloud.labelled
+    confidence = None if cloud.confidence is None else cloud.confidence[keep]
+    variances = None if not _uncertain(cloud) else cloud_variances(cloud)[keep].astype(np.float64)
     features = cloud_features(cloud, field.model.features)
     if cloud.labels is not None:
-        field.add(cloud.points[keep], cloud.labels[keep], None, features[keep])
+        field.add(cloud.points[keep], cloud.labels[keep], None, features[keep], confidence, variances)
     elif cloud.weights is not None:
-        field.add(cloud.points[keep], None, cloud.class_weights[keep], features[keep])
+        field.add(cloud.points[keep], None, cloud.class_weights[keep], features[keep], confidence, variances)
+
+
+def cloud_variances(cloud: LabelledCloud) -> F32:
+    """Return the variances (N, 3) of a cloud's positions along the axes of the world, 0 where they are certain."""
+    covariances = cloud.position_covariances
+    if covariances is None:
+        return np.zeros((len(cloud), 3), dtype=np.float32)
+    return np.diagonal(covariances, axis1=1, axis2=2).astype(np.float32)
+
+
+def _uncertain(cloud: LabelledCloud) -> bool:
+    return cloud.covariances is not None or cloud.pose_covariance is not None
 
 
 def cloud_features(cloud: LabelledCloud, names: tuple[str, ...]) -> F32:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT
+from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT, SPREAD_UNIT
 from semgp.blocks.arrays import F32, I32, I64, U32
 from semgp.blocks.sites import CELL_BITS, Sites
 from semgp.parallel import n_workers, parallel_map, slices
@@ -28,8 +28,9 @@ class Layout(NamedTuple):
     cells (L,): ids. start (L + 1,): where each cell's sites begin. row (S,): index of each site in `Sites`.
     X (S, D): position in metres from the cell's lowest corner, and features. first (S + L,): where each coarse
     voxel's sites begin, and the last one's end, from `start[i] + i` on for cell i. n_coarse (L,): coarse voxels of
-    each cell. centre (S, D): mean of the sites of each coarse voxel, from `start[i]` on. mass (sites, C): class
-    mass of all sites of the map, in steps of `unit`.
+    each cell. centre (S, D): mean of the sites of each coarse voxel, from `start[i]` on. S (S, 3): variance of
+    each position, m^2; (0, 3) if all are certain. mass (sites, C): class mass of all sites of the map, in steps of
+    `unit`.
     """
 
     cells: I32
@@ -39,6 +40,7 @@ class Layout(NamedTuple):
     first: I32
     n_coarse: I32
     centre: F32
+    S: F32
     mass: U32
     unit: float
 
@@ -51,12 +53,14 @@ def lay_out(sites: Sites, cells: I32) -> Layout:
     row, first = np.empty(S, np.int32), np.empty(S + len(cells), np.int32)
     X, centre = np.empty((S, D), np.float32), np.empty((S, D), np.float32)
     n_coarse = np.zeros(len(cells), np.int32)
-    layout = Layout(cells, start, row, X, first, n_coarse, centre, sites.mass, 1.0 / MASS_UNIT)
+    spread = np.empty((S if len(sites.spread) else 0, 4), np.float32)
+    layout = Layout(cells, start, row, X, first, n_coarse, centre, spread, sites.mass, 1.0 / MASS_UNIT)
 
     def fill(part: slice) -> None:
         _fill(
-            layout, part.start, part.stop, sites.head, sites.next, sites.voxels.keys, sites.place, sites.resolution
-        )
+            layout, part.start, part.stop, sites.head, sites.next, sites.voxels.keys, sites.place, sites.spread,
+            sites.resolution,
+        )  # fmt: skip
 
     parallel_map(fill, slices(len(cells), max(1, len(cells) // (4 * n_workers()))))
     return layout
@@ -83,9 +87,10 @@ def _fill(
     following: I32,
     keys: I64,
     place: I64,
+    spread: I64,
     resolution: float,
 ) -> None:
-    cells, start, row, X, first, n_coarse, centre, mass, _ = layout
+    cells, start, row, X, first, n_coarse, centre, S, mass, _ = layout
     low = (1 << CELL_BITS) - 1
     fine = (1 << COARSE_BITS) - 1
     D = place.shape[1]
@@ -111,6 +116,10 @@ def _fill(
             X[s, 0] = (keys[r] >> 42 & low) * resolution + place[r, 0] * scale
             X[s, 1] = (keys[r] >> 21 & low) * resolution + place[r, 1] * scale
             X[s, 2] = (keys[r] & low) * resolution + place[r, 2] * scale
+            if len(S):
+                for d in range(3):
+                    S[s, d] = spread[r, d] / (total * float(SPREAD_UNIT))
+                S[s, 3] = max(spread[r, 3], 1)
             for d in range(3, D):
                 X[s, d] = place[r, d] / (total * float(FEATURE_UNIT))
             if codes[order[j]] >> 6 != previous:

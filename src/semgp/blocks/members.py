@@ -21,9 +21,14 @@ class Sizes(NamedTuple):
 
 
 class Members(NamedTuple):
-    """The members of one block: positions and features X (D, total), mass (total, C), sites joined k (total,)."""
+    """The members of one block.
+
+    X (D, total): positions and features. S (4, total): variances of the positions, and scans that saw them; (0,
+    total) if all are certain. mass (total, C). k (total,): sites joined.
+    """
 
     X: F32
+    S: F32
     mass: F32
     k: F32
 
@@ -161,6 +166,8 @@ def _add_site(
     out.X[0, n], out.X[1, n], out.X[2, n] = x[0] + dx, x[1] + dy, x[2] + dz
     for d in range(3, len(x)):
         out.X[d, n] = x[d]
+    for d in range(len(out.S)):
+        out.S[d, n] = layout.S[s, d]
     for c in range(layout.mass.shape[1]):
         out.mass[n, c] = layout.mass[layout.row[s], c] * layout.unit
     out.k[n] = 1
@@ -174,6 +181,8 @@ def _add_coarse(
     k = 0
     for d in range(out.X.shape[0]):
         out.X[d, n] = 0
+    for d in range(len(out.S)):
+        out.S[d, n] = 0
     for c in range(layout.mass.shape[1]):
         out.mass[n, c] = 0
     for s in range(b, e):
@@ -182,10 +191,14 @@ def _add_coarse(
         k += 1
         for d in range(out.X.shape[0]):
             out.X[d, n] += layout.X[s, d]
+        for d in range(len(out.S)):
+            out.S[d, n] += layout.S[s, d]
         for c in range(layout.mass.shape[1]):
             out.mass[n, c] += layout.mass[layout.row[s], c] * layout.unit
     for d in range(out.X.shape[0]):
         out.X[d, n] /= k
+    for d in range(len(out.S)):
+        out.S[d, n] /= k
     out.X[0, n] += dx
     out.X[1, n] += dy
     out.X[2, n] += dz

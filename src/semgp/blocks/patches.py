@@ -14,23 +14,31 @@ from semgp.blocks.solved import Solved, class_mass
 class Patch(NamedTuple):
     """A block, unsolved, and held-out points in its leaf.
 
-    X (D, n), k (n,): members. present (P,). mass (P, n). Y (D, m), label (m,): held-out points and their classes.
+    X (D, n), S (4, n) or (0, n), k (n,): members. present (P,). mass (P, n). Y (D, m), SY (3, m) or (0, m), label
+    (m,): held-out points, the variances of their positions, and their classes.
     """
 
     X: F32
+    S: F32
     k: F32
     present: I16
     mass: F32
     Y: F32
+    SY: F32
     label: I32
 
 
-def patch(solved: Solved, b: int, Y: F32, label: I32) -> Patch:
-    """Return the patch of block b of a piece and held-out points (m, D) with labels (m,)."""
+def patch(solved: Solved, b: int, Y: F32, SY: F32, label: I32) -> Patch:
+    """Return the patch of block b of a piece and held-out points (m, D), of variances (m, 3), with labels (m,).
+
+    Where the block's positions are certain, so are the points'.
+    """
+    S = solved.S[b]
     n, P = int(solved.n[b]), int(solved.n_present[b])
     return Patch(
-        solved.X[b, :, :n].copy(), solved.k[b, :n].copy(), solved.present[b, :P].copy(),
-        class_mass(solved, b).copy(), np.ascontiguousarray(Y.T), label,
+        solved.X[b, :, :n].copy(), S[:, :n].copy(), solved.k[b, :n].copy(), solved.present[b, :P].copy(),
+        class_mass(solved, b).copy(), np.ascontiguousarray(Y.T), np.ascontiguousarray(SY.T if len(S) else
+        SY.T[:0]), label,
     )  # fmt: skip
 
 
@@ -39,15 +47,19 @@ class Packed(NamedTuple):
 
     sizes: I64
     X: F32
+    S: F32
     k: F32
     present: I16
     mass: F32
     Y: F32
+    SY: F32
     label: I32
 
 
 def packed(patches: Sequence[Patch]) -> Packed:
     """Return patches in flat arrays."""
     sizes = np.array([(len(p.k), len(p.present), len(p.label)) for p in patches], dtype=np.int64)
-    X, k, present, mass, Y, label = (np.concatenate([a.ravel() for a in column]) for column in zip(*patches))
-    return Packed(sizes, X, k, present, mass, Y, label)
+    X, S, k, present, mass, Y, SY, label = (
+        np.concatenate([a.ravel() for a in column]) for column in zip(*patches)
+    )
+    return Packed(sizes, X, S, k, present, mass, Y, SY, label)

@@ -6,13 +6,14 @@ and any number of threads give the same bits.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.blocks.accumulate import MASS_UNIT, PLACE_UNIT, add_hard, add_soft, chain
+from semgp.blocks.accumulate import MASS_UNIT, PLACE_UNIT, add_hard, add_soft, add_spread, chain
 from semgp.blocks.arrays import F32, F64, I32, I64, U32
 from semgp.errors import InputError
 from semgp.voxels import VoxelTable, voxel_indices, voxel_keys, voxel_origin
@@ -21,7 +22,7 @@ CELL_BITS = 6
 CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
 
-_LARGEST_WEIGHT, _LARGEST_FEATURE = 64, 30_000
+_LARGEST_WEIGHT, _LARGEST_FEATURE, _LARGEST_VARIANCE = 64, 30_000, 100
 
 
 class Sites:
@@ -53,6 +54,7 @@ class Sites:
         self.voxels, self.cells = VoxelTable(), VoxelTable()
         self._mass = np.zeros((0, n_classes), dtype=np.uint32)
         self._place = np.zeros((0, 3 + n_features), dtype=np.int64)
+        self._spread = np.zeros((0, 4), dtype=np.int64)
         self._next = np.empty(0, dtype=np.int32)
         self._cell = np.empty(0, dtype=np.int32)
         self._head = np.empty(0, dtype=np.int32)
@@ -71,6 +73,14 @@ class Sites:
     def place(self) -> I64:
         """Mass times position within the voxel and features, summed (S, 3 + F)."""
         return self._place[: len(self)]
+
+    @property
+    def spread(self) -> I64:
+        """Mass times variance of position, summed along three axes, and scans (S, 4).
+
+        (0, 4) as long as all positions are certain.
+        """
+        return self._spread[: len(self)]
 
     @property
     def head(self) -> I32:
@@ -99,7 +109,7 @@ class Sites:
     @property
     def n_bytes(self) -> int:
         """Bytes of all arrays."""
-        owned = (self._mass, self._place, self._next, self._cell, self._head, self._size)
+        owned = (self._mass, self._place, self._spread, self._next, self._cell, self._head, self._size)
         return sum(a.nbytes for a in owned) + self.voxels.n_bytes + self.cells.n_bytes
 
     def add(
@@ -108,25 +118,56 @@ class Sites:
         labels: I32 | None,
         weights: F32 | None,
         features: F32,
+        confidence: F32 | None = None,
+        variances: F64 | None = None,
     ) -> I32:
         """Add labelled points, hard or soft, and return the cells that they lie in.
+
+        Parameters
+        ----------
+        points : (N, 3) array
+            Metres.
+        labels : (N,) array or None
+            Hard labels.
+        weights : (N, C) array or None
+            Soft labels instead.
+        features : (N, F) array
+            Inputs beyond position.
+        confidence : (N,) array, optional
+            What each label counts, 0 to 1.
+        variances : (N, 3) array, optional
+            Variance of each position, m^2.
 
         Raises
         ------
         InputError
-            Points a million voxels from the first, or weights or features beyond what a sum can hold.
+            Points a million voxels from the first, or weights, features or variances beyond what a sum can hold.
         """
         if not len(points):
             return np.empty(0, dtype=np.int32)
+        if variances is not None and variances.max() > _LARGEST_VARIANCE:
+            raise InputError(
+                f"positions must be known to {math.sqrt(_LARGEST_VARIANCE):g} m, a variance of "
+                f"{_LARGEST_VARIANCE} m^2: drop points that are less certain."
+            )
         if weights is not None and weights.max() > _LARGEST_WEIGHT:
             raise InputError(f"weights of soft labels must be {_LARGEST_WEIGHT} at most: divide them.")
         if np.abs(features).max(initial=0) > _LARGEST_FEATURE:
             raise InputError(f"features must lie within {_LARGEST_FEATURE} of 0: scale them.")
+        amounts = np.full(len(points), MASS_UNIT)
+        if confidence is not None:
+            amounts = np.rint(confidence * MASS_UNIT).astype(np.int64)
+        heavy = amounts > 0
         if weights is not None:
+            weights = weights if confidence is None else weights * confidence[:, None]
             heavy = np.rint(weights * MASS_UNIT).sum(axis=1) > 0
-            points, weights, features = points[heavy], weights[heavy], features[heavy]
-            if not len(points):
-                return np.empty(0, dtype=np.int32)
+        if not heavy.all():
+            points, features, amounts = points[heavy], features[heavy], amounts[heavy]
+            labels = None if labels is None else labels[heavy]
+            weights = None if weights is None else weights[heavy]
+            variances = None if variances is None else variances[heavy]
+        if not len(points):
+            return np.empty(0, dtype=np.int32)
         origin = self.origin
         if origin is None:
             origin = voxel_origin(points, self.resolution) >> CELL_BITS << CELL_BITS
@@ -135,14 +176,14 @@ class Sites:
         rows = self.voxels.insert(keys)
         self._grow()
         self._link(known)
+        where = (amounts, points, self.resolution, features, self._cell, self._mass, self._place, self.drift)
         if labels is not None:
-            add_hard(
-                rows, labels, points, self.resolution, features, self._cell, self._mass, self._place, self.drift
-            )
+            add_hard(rows, labels, *where)
         elif weights is not None:
-            add_soft(
-                rows, weights, points, self.resolution, features, self._cell, self._mass, self._place, self.drift
-            )
+            add_soft(rows, weights, *where)
+        if variances is not None:
+            self._spread = _extended(self._spread, len(self), 0)
+            add_spread(rows, amounts, variances, self._spread)
         touched = np.zeros(len(self.cells), dtype=bool)
         touched[self._cell[rows]] = True
         return np.flatnonzero(touched).astype(np.int32)
@@ -158,6 +199,8 @@ class Sites:
     def _grow(self) -> None:
         n = len(self.voxels)
         self._mass, self._place = _extended(self._mass, n, 0), _extended(self._place, n, 0)
+        if len(self._spread):
+            self._spread = _extended(self._spread, n, 0)
         self._next, self._cell = _extended(self._next, n, -1), _extended(self._cell, n, -1)
 
     def _link(self, known: int) -> None:
@@ -170,12 +213,9 @@ class Sites:
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays from which `restore` makes the same sites."""
         origin = np.zeros(3, dtype=np.int64) if self.origin is None else self.origin
-        return {
-            "voxels": self.voxels.keys,
-            "mass": self.mass,
-            "place": self.place,
-            "origin": origin,
-        }
+        arrays: dict[str, NDArray[Any]]
+        arrays = {"voxels": self.voxels.keys, "mass": self.mass, "place": self.place, "origin": origin}
+        return arrays | ({"spread": self.spread} if len(self._spread) else {})
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Fill empty sites with what `to_arrays` gave.
@@ -196,12 +236,16 @@ class Sites:
             raise InputError(
                 "the stored sites are damaged: a voxel out of range, without mass, or left by its site."
             )
+        if "spread" in arrays and (arrays["spread"] < 0).any():
+            raise InputError("the stored sites are damaged: a variance is negative.")
         if (arrays["origin"] % CELL).any():
             raise InputError("the stored sites are damaged: their origin is no corner of a cell.")
         self.origin = arrays["origin"]
         self.voxels.insert(keys)
         self._grow()
         self._mass[: len(self)], self._place[: len(self)] = arrays["mass"], arrays["place"]
+        if "spread" in arrays:
+            self._spread = arrays["spread"].copy()
         self._link(0)
 
 

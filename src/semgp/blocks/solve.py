@@ -17,12 +17,13 @@ import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F32, I8, I16, I32, I64
-from semgp.blocks.covariance import Mixture, covariance_lower
+from semgp.blocks.covariance import Mixture
 from semgp.blocks.layout import Layout
 from semgp.blocks.linear import inverse_factor, pack, packed_size
 from semgp.blocks.members import Members, Sizes, gather
 from semgp.blocks.solved import SHARED, Solved
 from semgp.blocks.tree import split
+from semgp.blocks.uncertain import member_covariance
 
 JITTER = 3e-5
 """Noise added to every member, times the prior variance: single precision factors nothing closer to singular."""
@@ -75,10 +76,12 @@ def solve_cells(
         Room for the blocks' factors.
     """
     T, D, C = sizes.total, layout.X.shape[1], layout.mass.shape[1]
+    U = 4 if len(layout.S) else 0
     B = leaves.sum()
     solved = Solved(
         np.zeros(B, np.int32),
         np.empty((B, D, T), np.float32),
+        np.empty((B, U, T), np.float32),
         np.empty((B, T), np.float32),
         np.zeros(B, np.int32),
         np.empty((B, C), np.int16),
@@ -89,7 +92,8 @@ def solve_cells(
     )
     coefficients = solved.coefficients
     marks = np.full(len(layout.row), -1, np.int32)
-    members = Members(np.empty((D, T), np.float32), np.empty((T, C), np.float32), np.empty(T, np.float32))
+    X, S = np.empty((D, T), np.float32), np.empty((U, T), np.float32)
+    members = Members(X, S, np.empty((T, C), np.float32), np.empty(T, np.float32))
     K, work, inverse = np.empty(T * T, np.float32), np.empty(T, np.float32), np.empty(T * T, np.float32)
     b = -1
     for i in range(len(places)):
@@ -114,6 +118,8 @@ def solve_cells(
                 solved.k[b, j] = members.k[j]
                 for d in range(D):
                     solved.X[b, d, j] = members.X[d, j]
+                for d in range(U):
+                    solved.S[b, d, j] = members.S[d, j]
             solved.at[b + 1] = solved.at[b] + W * n
             solved.at_factor[b + 1] = solved.at_factor[b] + (packed_size(n) if noise.solve else 0)
             rows = coefficients[solved.at[b] : solved.at[b + 1]].reshape(W, n)
@@ -125,7 +131,17 @@ def solve_cells(
             if noise.solve and n:
                 L_inverse = inverse[: n * n].reshape(n, n)
                 solve_block(
-                    members.X, members.k, n, solved.present[b, :P], kernel, noise, rows, L_inverse, K, work
+                    members.X,
+                    members.S,
+                    members.k,
+                    n,
+                    solved.present[b, :P],
+                    kernel,
+                    noise,
+                    rows,
+                    L_inverse,
+                    K,
+                    work,
                 )
                 pack(L_inverse, solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]])
             else:
@@ -135,6 +151,7 @@ def solve_cells(
     return Solved(
         solved.n,
         solved.X,
+        solved.S,
         solved.k,
         solved.n_present,
         solved.present,
@@ -161,6 +178,7 @@ def _present(mass: F32, n: int, present: I16) -> int:
 @njit(cache=True, nogil=True)
 def solve_block(
     X: F32,
+    S: F32,
     k: F32,
     n: int,
     present: I16,
@@ -175,8 +193,8 @@ def solve_block(
 
     Parameters
     ----------
-    X, k : (D, .), (.,) arrays
-        Positions, and the number of sites joined, of the first n members.
+    X, S, k : (D, .), (4, .) or (0, .), (.,) arrays
+        Positions, their variances and scans, and the number of sites joined, of the first n members.
     n : int
         Members.
     present : (P,) array
@@ -196,7 +214,7 @@ def solve_block(
     jitter = np.float32(0)
     for v in kernel.variance:
         jitter += np.float32(JITTER) * v
-    covariance_lower(X, n, kernel, A, work)
+    member_covariance(X, S, n, kernel, A, work)
     for j in range(n):
         A[j, j] += np.float32(noise.s_n) / rows[2 + 2 * P, j] + np.float32(noise.nugget) / k[j] + jitter
     inverse_factor(A, factor)

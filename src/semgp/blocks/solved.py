@@ -15,14 +15,16 @@ SHARED = 3
 class Solved(NamedTuple):
     """Posteriors of some cells' blocks, one after the other.
 
-    n (B,): members. X (B, D, total), k (B, total): their positions, and the sites that they join. n_present (B,),
-    present (B, C): the classes with mass in the block. at (B + 1,), coefficients: where in the flat array each
-    block's (3 + 3 P, n) coefficients begin. at_factor (B + 1,), factor: the same for the inverse Cholesky factors,
-    lower triangles row by row.
+    n (B,): members. X (B, D, total), k (B, total): their positions, and the sites that they join. S (B, 4, total):
+    variances of the positions, and scans that saw them; (B, 0, total) if all are certain. n_present (B,), present
+    (B, C): the classes with mass in the block. at (B + 1,), coefficients: where in the flat array each block's (3
+    + 3 P, n) coefficients begin. at_factor (B + 1,), factor: the same for the inverse Cholesky factors, lower
+    triangles row by row.
     """
 
     n: I32
     X: F32
+    S: F32
     k: F32
     n_present: I32
     present: I16
@@ -44,6 +46,6 @@ def taken(solved: Solved, blocks: I64) -> Solved:
     factors = [solved.factor[solved.at_factor[b] : solved.at_factor[b + 1]] for b in blocks]
     at, at_factor = (np.cumsum([0, *map(len, parts)], dtype=np.int64) for parts in (rows, factors))
     return Solved(
-        solved.n[blocks], solved.X[blocks], solved.k[blocks], solved.n_present[blocks], solved.present[blocks],
-        at, np.concatenate(rows), at_factor, np.concatenate(factors),
+        solved.n[blocks], solved.X[blocks], solved.S[blocks], solved.k[blocks], solved.n_present[blocks],
+        solved.present[blocks], at, np.concatenate(rows), at_factor, np.concatenate(factors),
     )  # fmt: skip
