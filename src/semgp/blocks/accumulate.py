@@ -120,6 +120,42 @@ def add_spread(rows: I64, amounts: I64, variances: F64, spread: I64) -> None:
 
 
 @njit(cache=True, nogil=True)
+def fade_cells(cells: I64, factors: F64, head: I32, following: I32, mass: U32, place: I64, spread: I64) -> None:
+    """Multiply the mass of all sites of some cells by a factor each."""
+    for i in range(len(cells)):
+        r = head[cells[i]]
+        while r >= 0 and factors[i] < 1:
+            _fade(r, factors[i], mass, place, spread)
+            r = following[r]
+
+
+@njit(cache=True, nogil=True)
+def fade_rows(rows: I64, factor: float, cell: I32, mass: U32, place: I64, spread: I64, drift: F64) -> None:
+    """Multiply the mass of some sites by a factor."""
+    for r in rows:
+        drift[cell[r]] += (1 - factor) / 2
+        _fade(r, factor, mass, place, spread)
+
+
+@njit(cache=True, nogil=True)
+def _fade(r: int, factor: float, mass: U32, place: I64, spread: I64) -> None:
+    """Multiply the mass of a site by a factor, its place and variance left as they are; one step of mass stays."""
+    before, after, top = np.int64(0), np.int64(0), 0
+    for c in range(mass.shape[1]):
+        before += np.int64(mass[r, c])
+        top = c if mass[r, c] > mass[r, top] else top
+        mass[r, c] = np.uint32(np.rint(mass[r, c] * factor))
+        after += np.int64(mass[r, c])
+    if after == 0:
+        mass[r, top], after = 1, np.int64(1)
+    share = after / before
+    for d in range(place.shape[1]):
+        place[r, d] = np.int64(np.rint(place[r, d] * share))
+    for d in range(3 if len(spread) else 0):
+        spread[r, d] = np.int64(np.rint(spread[r, d] * share))
+
+
+@njit(cache=True, nogil=True)
 def _add_place(row: np.int64, w: int | np.int64, point: F64, resolution: float, features: F32, place: I64) -> None:
     """Add mass w at a point, and its features, to a site's sums."""
     for d in range(3):

@@ -136,7 +136,7 @@ class Field:
 
     def query(self, points: F64, features: F32, tolerance: float = 0.0) -> Answers:
         """Answer at points (M, 3) with features (M, F), NaN where unknown; stale blocks are solved first."""
-        if self.sites.origin is None:
+        if not len(self.sites):
             nothing = np.broadcast_to(self._unknown[: self._n_classes], (len(points), self._n_classes))
             return Answers(nothing, np.full(len(points), self.prior_variance, np.float32))
         half = self.model.blend / 2

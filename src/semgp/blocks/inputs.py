@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from semgp.blocks.arrays import F32
+from semgp.blocks.arrays import F32, F64, I32
 from semgp.blocks.field import Field
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 
 COLOURS = ("red", "green", "blue")
+
+
+class Inputs(NamedTuple):
+    """What `Field.add` takes of a cloud: its labelled points and what belongs to them."""
+
+    points: F64
+    labels: I32 | None
+    weights: F32 | None
+    features: F32
+    confidence: F32 | None
+    variances: F64 | None
 
 
 def add_cloud(field: Field, cloud: LabelledCloud) -> None:
@@ -20,14 +33,28 @@ def add_cloud(field: Field, cloud: LabelledCloud) -> None:
     InputError
         A cloud without the features that the model asks for, or points a million voxels from the first.
     """
+    field.add(*cloud_inputs(cloud, field.model.features))
+
+
+def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Inputs:
+    """Return what a field takes of a cloud, with features by name.
+
+    Raises
+    ------
+    InputError
+        A feature that the cloud does not have.
+    """
+    columns = cloud_features(cloud, features)
     keep = cloud.labelled
-    confidence = None if cloud.confidence is None else cloud.confidence[keep]
-    variances = None if not _uncertain(cloud) else cloud_variances(cloud)[keep].astype(np.float64)
-    features = cloud_features(cloud, field.model.features)
-    if cloud.labels is not None:
-        field.add(cloud.points[keep], cloud.labels[keep], None, features[keep], confidence, variances)
-    elif cloud.weights is not None:
-        field.add(cloud.points[keep], None, cloud.class_weights[keep], features[keep], confidence, variances)
+    certain = cloud.covariances is None and cloud.pose_covariance is None
+    return Inputs(
+        cloud.points[keep],
+        None if cloud.labels is None else cloud.labels[keep],
+        None if cloud.weights is None else cloud.class_weights[keep],
+        columns[keep],
+        None if cloud.confidence is None else cloud.confidence[keep],
+        None if certain else cloud_variances(cloud[keep]).astype(np.float64),
+    )
 
 
 def cloud_variances(cloud: LabelledCloud) -> F32:
@@ -36,10 +63,6 @@ def cloud_variances(cloud: LabelledCloud) -> F32:
     if covariances is None:
         return np.zeros((len(cloud), 3), dtype=np.float32)
     return np.diagonal(covariances, axis1=1, axis2=2).astype(np.float32)
-
-
-def _uncertain(cloud: LabelledCloud) -> bool:
-    return cloud.covariances is not None or cloud.pose_covariance is not None
 
 
 def cloud_features(cloud: LabelledCloud, names: tuple[str, ...]) -> F32:

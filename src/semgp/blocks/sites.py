@@ -13,8 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.blocks.accumulate import MASS_UNIT, PLACE_UNIT, add_hard, add_soft, add_spread, chain
-from semgp.blocks.arrays import F32, F64, I32, I64, U32
+from semgp.blocks.accumulate import (
+    MASS_UNIT,
+    PLACE_UNIT,
+    add_hard,
+    add_soft,
+    add_spread,
+    chain,
+    fade_cells,
+    fade_rows,
+)
+from semgp.blocks.arrays import F32, F64, I32, I64, U32, Bool
 from semgp.errors import InputError
 from semgp.voxels import VoxelTable, voxel_indices, voxel_keys, voxel_origin
 
@@ -46,6 +55,10 @@ class Sites:
         How much each cell's sites have changed since someone set this to 0, summed over them: 1 for a new site;
         for a label added to n, (1 - its class's share + 1/2) / (n + 1), half the L1 change of the shares and half
         the growth of the mass.
+    clock : float
+        The time, for whom it matters: see `fade`.
+    time : (cells,) array
+        When each cell was last faded, or was new.
     """
 
     def __init__(self, n_classes: int, n_features: int, resolution: float) -> None:
@@ -59,7 +72,8 @@ class Sites:
         self._cell = np.empty(0, dtype=np.int32)
         self._head = np.empty(0, dtype=np.int32)
         self._size = np.empty(0, dtype=np.int32)
-        self.drift = np.empty(0, dtype=np.float64)
+        self.drift, self.time = np.empty(0, dtype=np.float64), np.empty(0, dtype=np.float64)
+        self.clock = 0.0
 
     def __len__(self) -> int:
         return len(self.voxels)
@@ -170,7 +184,7 @@ class Sites:
             return np.empty(0, dtype=np.int32)
         origin = self.origin
         if origin is None:
-            origin = voxel_origin(points, self.resolution) >> CELL_BITS << CELL_BITS
+            origin = cell_origin(points, self.resolution)
         keys = voxel_keys(points, self.resolution, origin)
         self.origin, known = origin, len(self)
         rows = self.voxels.insert(keys)
@@ -188,12 +202,25 @@ class Sites:
         touched[self._cell[rows]] = True
         return np.flatnonzero(touched).astype(np.int32)
 
+    def fade(self, cells: I64, half_life: float) -> None:
+        """Let the sites of some cells lose half their mass for each half-life since the cells were last faded."""
+        factors = 0.5 ** ((self.clock - self.time[cells]) / half_life)
+        fade_cells(cells, factors, self._head, self._next, self._mass, self._place, self._spread)
+        self.time[cells] = self.clock
+
+    def fade_sites(self, rows: I64, factor: float) -> I32:
+        """Multiply the mass of some sites by a factor below 1, and return their cells."""
+        fade_rows(rows, factor, self._cell, self._mass, self._place, self._spread, self.drift)
+        return np.unique(self._cell[rows])
+
     def cell_ids(self, keys: I64) -> I32:
         """Return the cells of cell keys; those not met before are new, and empty."""
-        ids = self.cells.insert(keys).astype(np.int32)
+        known, ids = len(self.cells), self.cells.insert(keys).astype(np.int32)
         self._head = _extended(self._head, len(self.cells), -1)
         self._size = _extended(self._size, len(self.cells), 0)
         self.drift = _extended(self.drift, len(self.cells), 0)
+        self.time = _extended(self.time, len(self.cells), 0)
+        self.time[known : len(self.cells)] = self.clock
         return ids
 
     def _grow(self) -> None:
@@ -215,7 +242,16 @@ class Sites:
         origin = np.zeros(3, dtype=np.int64) if self.origin is None else self.origin
         arrays: dict[str, NDArray[Any]]
         arrays = {"voxels": self.voxels.keys, "mass": self.mass, "place": self.place, "origin": origin}
-        return arrays | ({"spread": self.spread} if len(self._spread) else {})
+        if len(self._spread):
+            arrays["spread"] = self.spread
+        if self.clock:
+            arrays |= {"cells": self.cells.keys, "time": np.append(self.time[: len(self.cells)], self.clock)}
+        return arrays
+
+    def only(self, keep: Bool) -> dict[str, NDArray[Any]]:
+        """Return the arrays of some of the sites."""
+        rows = ("voxels", "mass", "place", "spread")
+        return {name: a[keep] if name in rows else a for name, a in self.to_arrays().items()}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Fill empty sites with what `to_arrays` gave.
@@ -247,6 +283,14 @@ class Sites:
         if "spread" in arrays:
             self._spread = arrays["spread"].copy()
         self._link(0)
+        if "time" in arrays:
+            cells = self.cell_ids(arrays["cells"])
+            self.time[cells], self.clock = arrays["time"][:-1], float(arrays["time"][-1])
+
+
+def cell_origin(points: F64, resolution: float) -> I64:
+    """Return the origin (3,) of the keys of a map that begins with `points`: the corner of a cell."""
+    return np.asarray(voxel_origin(points, resolution) >> CELL_BITS << CELL_BITS)
 
 
 def cell_keys(keys: I64) -> I64:

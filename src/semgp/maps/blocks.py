@@ -9,16 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgp.blocks.field import Field
-from semgp.blocks.inputs import add_cloud
+from semgp.blocks.inputs import cloud_inputs
 from semgp.blocks.model import BlockModel
-from semgp.blocks.sites import CELL
+from semgp.blocks.sites import CELL, cell_origin
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
+from semgp.maps.forgetting import Forgetting, faint
 from semgp.maps.free_space import FreeSpace
-from semgp.maps.occupancy import Occupancy
+from semgp.maps.occupancy import Occupancy, Rays
 from semgp.maps.settings import require_data, stored_array
 from semgp.prediction import Prediction
+from semgp.voxels import voxel_keys
 
 UNEXPLAINED = 0.95
 """A point whose latent variance is above this share of the prior's counts as not observed."""
@@ -35,14 +37,28 @@ class ManyBlocks:
         What is fixed for the life of the map.
     free : FreeSpace, optional
         For a map that keeps free space, too.
+    forgetting : Forgetting, optional
+        For a map that keeps free space and forgets.
 
     Raises
     ------
     InputError
-        A model for another number of classes, or settings of free space that do not go with it.
+        A model for another number of classes, settings of free space that do not go with it, or forgetting without
+        free space.
     """
 
-    def __init__(self, classes: Classes, model: BlockModel, free: FreeSpace | None = None) -> None:
+    def __init__(
+        self,
+        classes: Classes,
+        model: BlockModel,
+        free: FreeSpace | None = None,
+        forgetting: Forgetting | None = None,
+    ) -> None:
+        if forgetting is not None and free is None:
+            raise InputError(
+                "a map that forgets needs to see what rays pass through: give it free=FreeSpace(), too."
+            )
+        self.forgetting = forgetting
         self.classes, self.model = classes, model
         self.tolerance = 0.0
         self._field = Field(model, len(classes))
@@ -57,10 +73,47 @@ class ManyBlocks:
             Features that are missing, a pose that is needed, or points a million voxels from the first. The map is
             then as before.
         """
-        rays = None if self.occupancy is None else self.occupancy.sample(cloud)
-        add_cloud(self._field, cloud)
-        if self.occupancy is not None and rays is not None:
-            self.occupancy.add(rays)
+        inputs = cloud_inputs(cloud, self.model.features)
+        if self.occupancy is None or not len(cloud):
+            self._field.add(*inputs)
+            return
+        now = 0.0 if self.forgetting is None else self.forgetting.clock(cloud, self._field.sites.clock)
+        rays = self.occupancy.sample(cloud, watch=self.forgetting is not None)
+        if self._field.sites.origin is None:
+            origin = cell_origin(cloud.points, self.model.resolution)
+            self._field.sites.origin = self.occupancy.field.sites.origin = origin
+        if self.forgetting is not None:
+            self._forget(self.forgetting, rays, now)
+        self._field.add(*inputs)
+        self.occupancy.add(rays)
+
+    def _forget(self, forgetting: Forgetting, rays: Rays, now: float) -> None:
+        """Fade what a cloud's rays come near, and what they pass through."""
+        assert self.occupancy is not None
+        origin = self._field.sites.origin
+        assert origin is not None
+        keys = voxel_keys(rays.points, self.model.resolution, origin)
+        for field in self._fields.values():
+            forgetting.fade(field, keys, now)
+        forgetting.give_up(self.occupancy.field, rays.passed)
+        forgetting.give_up(self._field, self.occupancy.mostly_free(rays.passed))
+        self._drop_faint()
+
+    def _drop_faint(self) -> None:
+        """Begin the fields anew without the sites that are forgotten, once those are more than half of all."""
+        for prefix, field in self._fields.items():
+            gone = faint(field.sites)
+            if 2 * np.count_nonzero(gone) > len(gone):
+                self._begin(prefix, field.sites.only(~gone))
+
+    def _begin(self, prefix: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Begin a field anew with stored sites."""
+        field = Field(self._fields[prefix].model, 2 if prefix else len(self.classes))
+        field.restore(arrays)
+        if self.occupancy is not None and prefix:
+            self.occupancy.field = field
+        else:
+            self._field = field
 
     def answer(self, X: NDArray[np.float64], features: NDArray[np.float32] | None) -> Prediction:
         """Answer at points (M, 3) with features (M, F), NaN where unknown, or None for all unknown.
@@ -90,19 +143,21 @@ class ManyBlocks:
 
     def crop(self, keep: Callable[[NDArray[np.float64]], NDArray[np.bool_]]) -> ManyBlocks:
         """Return the same of the sites that `keep` selects."""
-        mine = ManyBlocks(self.classes, self.model, None if self.occupancy is None else self.occupancy.free)
-        for name, field in self._fields.items():
-            chosen = keep(field.sites.positions)
-            arrays = field.sites.to_arrays()
-            mine._fields[name].restore(
-                arrays | {part: arrays[part][chosen] for part in ("voxels", "mass", "place")}
-            )
+        mine = ManyBlocks(self.classes, self.model, self.free, self.forgetting)
+        for prefix, field in self._fields.items():
+            mine._fields[prefix].restore(field.sites.only(keep(field.sites.positions)))
         return mine
 
     @property
+    def free(self) -> FreeSpace | None:
+        """How free space is kept, None where it is not."""
+        return None if self.occupancy is None else self.occupancy.free
+
+    @property
     def positions(self) -> NDArray[np.float64]:
-        """Sites (S, 3), metres."""
-        return self._field.sites.positions
+        """Sites (S, 3), metres, but for those that are forgotten."""
+        sites = self._field.sites
+        return sites.positions if self.forgetting is None else sites.positions[~faint(sites)]
 
     def __len__(self) -> int:
         """Return the number of sites."""
@@ -117,13 +172,14 @@ class ManyBlocks:
 
     def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Return the model and the sites; posteriors follow from them."""
-        free = None if self.occupancy is None else self.occupancy.free.to_json()
+        settings = {"free": self.free, "forgetting": self.forgetting}
+        header = {name: None if s is None else s.to_json() for name, s in settings.items()}
         arrays = {
             prefix + name: array
             for prefix, field in self._fields.items()
             for name, array in field.sites.to_arrays().items()
         }
-        return {"model": self.model.to_json(), "free": free}, arrays
+        return {"model": self.model.to_json(), **header}, arrays
 
     @classmethod
     def from_arrays(cls, classes: Classes, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Self:
@@ -134,19 +190,15 @@ class ManyBlocks:
         InputError
             A header or arrays that do not belong together.
         """
-        free = header.get("free")
+        free, forgetting = header.get("free"), header.get("forgetting")
         made = cls(
-            classes, BlockModel.from_json(header["model"]), None if free is None else FreeSpace.from_json(free)
+            classes,
+            BlockModel.from_json(header["model"]),
+            None if free is None else FreeSpace.from_json(free),
+            None if forgetting is None else Forgetting.from_json(forgetting),
         )
         for prefix, field in made._fields.items():
-            columns = field.sites.mass.shape[1]
-            voxels = stored_array(arrays, prefix + "voxels", np.int64, (None,))
-            field.restore({
-                "voxels": voxels,
-                "mass": stored_array(arrays, prefix + "mass", np.uint32, (len(voxels), columns)),
-                "place": stored_array(arrays, prefix + "place", np.int64, (len(voxels), field.model.n_dims)),
-                "origin": stored_array(arrays, prefix + "origin", np.int64, (3,)),
-            })  # fmt: skip
+            field.restore(_stored_sites(arrays, prefix, field))
         return made
 
     @property
@@ -166,3 +218,20 @@ def _counts(field: Field) -> dict[str, Any]:
         "bytes_a_site": round(sites.n_bytes / max(len(sites), 1), 1),
         "solved_bytes": store.n_bytes,
     }
+
+
+def _stored_sites(arrays: Mapping[str, NDArray[Any]], prefix: str, field: Field) -> dict[str, NDArray[Any]]:
+    """The stored arrays of a field's sites, checked."""
+    n = len(stored_array(arrays, prefix + "voxels", np.int64, (None,)))
+    shapes: dict[str, tuple[type[np.generic], tuple[int | None, ...]]] = {
+        "voxels": (np.int64, (n,)),
+        "mass": (np.uint32, (n, field.sites.mass.shape[1])),
+        "place": (np.int64, (n, field.model.n_dims)),
+        "origin": (np.int64, (3,)),
+    }
+    if prefix + "spread" in arrays:
+        shapes["spread"] = (np.int64, (n, 4))
+    if prefix + "time" in arrays:
+        cells = len(stored_array(arrays, prefix + "cells", np.int64, (None,)))
+        shapes |= {"cells": (np.int64, (cells,)), "time": (np.float64, (cells + 1,))}
+    return {name: stored_array(arrays, prefix + name, *wanted) for name, wanted in shapes.items()}

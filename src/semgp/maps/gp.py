@@ -15,6 +15,7 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
 from semgp.maps.blocks import ManyBlocks
+from semgp.maps.forgetting import Forgetting
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.occupancy import FREE, OCCUPIED, Occupancy
 from semgp.maps.presets import GENERAL
@@ -45,11 +46,15 @@ class GPSemanticMap:
     free : FreeSpace, optional
         For block maps that keep free space, too, from the rays of clouds with a pose. Predictions then have an
         `occupancy`: class c is there with probability `occupancy.probability * probability[:, c]`.
+    forgetting : Forgetting, optional
+        For maps with free space that forget what was long ago and what rays pass through. Answers then depend on
+        the order of updates.
 
     Raises
     ------
     InputError
-        A model for another number of classes, a tolerance that is negative, or free space for a `GPModel`.
+        A model for another number of classes, a tolerance that is negative, free space for a `GPModel`, or
+        forgetting without free space.
     """
 
     kind = "gp"
@@ -61,12 +66,13 @@ class GPSemanticMap:
         tolerance: float = 0.0,
         *,
         free: FreeSpace | None = None,
+        forgetting: Forgetting | None = None,
     ) -> None:
         if not (math.isfinite(tolerance) and tolerance >= 0):
             raise InputError(f"the tolerance must be a number, 0 or above, not {tolerance}.")
         self.classes = classes
         self.model = GENERAL if model is None else model
-        self._state = _state(classes, self.model, free)
+        self._state = _state(classes, self.model, free, forgetting)
         if isinstance(self._state, ManyBlocks):
             self._state.tolerance = tolerance
 
@@ -139,8 +145,7 @@ class GPSemanticMap:
     @property
     def free(self) -> FreeSpace | None:
         """How free space is kept, None where it is not."""
-        occupancy = self._state.occupancy if isinstance(self._state, ManyBlocks) else None
-        return None if occupancy is None else occupancy.free
+        return self._state.free if isinstance(self._state, ManyBlocks) else None
 
     @property
     def occupied_positions(self) -> NDArray[np.float64]:
@@ -205,11 +210,13 @@ class GPSemanticMap:
         return made
 
 
-def _state(classes: Classes, model: BlockModel | GPModel, free: FreeSpace | None) -> ManyBlocks | WholeScan:
+def _state(
+    classes: Classes, model: BlockModel | GPModel, free: FreeSpace | None, forgetting: Forgetting | None
+) -> ManyBlocks | WholeScan:
     if isinstance(model, BlockModel):
-        return ManyBlocks(classes, model, free)
-    if free is not None:
-        raise InputError("free space needs a map of many blocks: give GPSemanticMap a BlockModel.")
+        return ManyBlocks(classes, model, free, forgetting)
+    if free is not None or forgetting is not None:
+        raise InputError("free space and forgetting need a map of many blocks: give GPSemanticMap a BlockModel.")
     if isinstance(model, GPModel):
         return WholeScan(classes, model)
     raise InputError(f"the model must be a BlockModel or a GPModel, not {type(model).__name__}.")

@@ -23,10 +23,14 @@ KNOWN = 0.95
 
 
 class Rays(NamedTuple):
-    """What a cloud tells of space: points (n, 3) with labels (n,) `FREE` or `OCCUPIED`, one a voxel."""
+    """What a cloud tells of space: points (n, 3) with labels (n,) `FREE` or `OCCUPIED`, one a voxel.
+
+    passed (P,): keys of voxels that were occupied and that rays have passed without an end there.
+    """
 
     points: F64
     labels: I32
+    passed: I64
 
 
 class Occupancy:
@@ -48,8 +52,10 @@ class Occupancy:
         weights = np.diag([self.free.weight, 1.0]).astype(np.float32)[rays.labels]
         self.field.add(rays.points, None, weights, np.empty((len(rays.points), 0), dtype=np.float32))
 
-    def sample(self, cloud: LabelledCloud) -> Rays:
+    def sample(self, cloud: LabelledCloud, watch: bool = False) -> Rays:
         """Return the points of a cloud, as occupied, and samples along its rays, as free.
+
+        With `watch`, every sample in a voxel that is occupied so far counts, and what was passed is told.
 
         Raises
         ------
@@ -60,7 +66,7 @@ class Occupancy:
         if sensor is None:
             raise InputError("the cloud has no T_world_sensor, and rays begin at the sensor: give its pose.")
         if not len(cloud):
-            return Rays(np.empty((0, 3)), np.empty(0, dtype=np.int32))
+            return Rays(np.empty((0, 3)), np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64))
         sites = self.field.sites
         origin = voxel_origin(sensor[None], resolution) if sites.origin is None else sites.origin
         voxel_keys(
@@ -72,18 +78,28 @@ class Occupancy:
             resolution, origin.astype(np.float64), free.rays / len(cloud), free.seed, free.margin * resolution,
             free.near * resolution, free.thin, reach,
         )  # fmt: skip
-        samples, keys, _ = free_samples(sensor, cloud.points, walk, sites.voxels, np.empty(0, dtype=bool))
+        watched = sites.mass[:, OCCUPIED] > 0 if watch else np.empty(0, dtype=bool)
+        samples, keys, passed = free_samples(sensor, cloud.points, walk, sites.voxels, watched)
         table = VoxelTable()
         at_hits = _first(table, voxel_keys(hits, resolution, origin))
         at_samples = _first(table, keys)
         points = np.concatenate([hits[at_hits], samples[at_samples]])
-        return Rays(points, np.repeat(np.array([OCCUPIED, FREE], np.int32), [len(at_hits), len(at_samples)]))
+        labels = np.repeat(np.array([OCCUPIED, FREE], np.int32), [len(at_hits), len(at_samples)])
+        seen_through = sites.voxels.keys[np.flatnonzero(passed)]
+        at_end = table.find(seen_through) < len(at_hits)
+        return Rays(points, labels, seen_through[~(at_end & (table.find(seen_through) >= 0))])
 
     def answer(self, X: F64, tolerance: float = 0.0) -> OccupancyPrediction:
         """Return what is known at points (M, 3)."""
         answers = self.field.query(X, np.empty((len(X), 0), dtype=np.float32), tolerance)
         known = answers.variance < KNOWN * self.field.prior_variance
         return OccupancyPrediction(answers.probability[:, OCCUPIED], known)
+
+    def mostly_free(self, keys: I64) -> I64:
+        """Return those of the keys of voxels whose sightings say free rather than occupied."""
+        rows = self.field.sites.voxels.find(keys)
+        mass = self.field.sites.mass[rows[rows >= 0]]
+        return keys[rows >= 0][mass[:, FREE] > mass[:, OCCUPIED]]
 
     def positions(self, label: int) -> F64:
         """Return the sites (n, 3) at most of whose sightings the label, `FREE` or `OCCUPIED`, was right."""
