@@ -2,10 +2,10 @@
 
     uv run benchmarks/uncertain_poses.py DATA/semantickitti_08
 
-Each scan's pose is moved and turned at random. The map, built from a network's labels at the places where the wrong
-poses put them, is asked at every truly labelled point at its right place. "ignored" takes the poses as right, "known"
-passes the covariance of the errors on. The model is the preset, which knows nothing of pose errors, or is learned
-from the same wrongly placed scans, once without and once with their covariances.
+Each scan's pose is moved and turned at random. The map, built from a network's labels at the places where the
+wrong poses put them, is asked at every truly labelled point at its right place. "ignored" takes the poses as
+right, "known" passes the covariance of the errors on. The model is the preset, which knows nothing of pose errors,
+or is learned from the same wrongly placed scans, once without and once with their covariances.
 """
 
 import argparse

@@ -21,7 +21,7 @@ from semgp.maps.occupancy import FREE, OCCUPIED, Occupancy
 from semgp.maps.presets import GENERAL
 from semgp.maps.protocol import query_points, require_classes
 from semgp.maps.whole import WholeScan
-from semgp.prediction import Prediction
+from semgp.prediction import OccupancyPrediction, Prediction
 
 
 class GPSemanticMap:
@@ -73,6 +73,7 @@ class GPSemanticMap:
         self.classes = classes
         self.model = GENERAL if model is None else model
         self._state = _state(classes, self.model, free, forgetting)
+        self._tolerance = tolerance
         if isinstance(self._state, ManyBlocks):
             self._state.tolerance = tolerance
 
@@ -105,6 +106,16 @@ class GPSemanticMap:
         """
         known = None if features is None else np.ascontiguousarray(features, dtype=np.float32)
         return self._state.answer(query_points(points), known)
+
+    def occupancy(self, points: ArrayLike) -> OccupancyPrediction:
+        """Return whether something is there, at points (M, 3), metres, world frame: `query` without the classes.
+
+        Raises
+        ------
+        InputError
+            Points that cannot be used, or a map that keeps no free space.
+        """
+        return self._occupancy.answer(query_points(points), self._tolerance)
 
     def solve(self) -> None:
         """Bring the posterior up to date now instead of at the next query."""

@@ -18,8 +18,12 @@ from semgp.voxels import VoxelTable, voxel_keys, voxel_origin
 FREE, OCCUPIED = 0, 1
 """The classes of the field."""
 
-KNOWN = 0.95
-"""A point whose latent variance is above this share of the prior's is neither known to be free nor occupied."""
+KNOWN = 0.25
+"""A point whose latent variance is above this share of the prior's is neither known to be free nor occupied.
+
+That is about two voxels from the nearest sample. Ten SemanticKITTI scans and NYU frame 282: 98 and 99.9 % of what
+an OctoMap of the same voxels knows is known, and hardly anything more than four voxels from that.
+"""
 
 
 class Rays(NamedTuple):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.prediction import Prediction
+from semgp.prediction import OccupancyPrediction, Prediction
 
 
 @runtime_checkable
@@ -60,6 +60,10 @@ class SpatialMap(SemanticMap, Protocol):
 
     What planners need: see `semgp.planning`.
     """
+
+    def occupancy(self, points: ArrayLike) -> OccupancyPrediction:
+        """Return what `query` says of occupancy at points (M, 3), without the classes: cheaper."""
+        ...
 
     @property
     def resolution(self) -> float:

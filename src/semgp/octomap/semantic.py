@@ -22,7 +22,6 @@ from semgp.octomap.morton import DEPTH, OUTSIDE
 from semgp.octomap.occupancy import OccupancyMap
 from semgp.octomap.reading import read_tree
 from semgp.octomap.sensor import SensorModel, log_odds
-from semgp.octomap.sensor import probability as occupancy_probability
 from semgp.octomap.tree import Leaves, cells_at, joined, prune
 from semgp.prediction import OccupancyPrediction, Prediction
 
@@ -102,11 +101,19 @@ class SemanticOctoMap(OccupancyMap):
         X = query_points(points)
         if self._labels.n_labelled == 0:
             raise InputError("the map has no labels yet: update it with a labelled cloud first.")
-        codes = self._codes(X)
-        probability, observed = self._labels.probability(codes, len(self.classes))
-        log_odds, known = self._bricks.find(codes)
-        occupancy = OccupancyPrediction(occupancy_probability(log_odds), known)
-        return Prediction(self.classes, probability, observed, occupancy=occupancy)
+        probability, observed = self._labels.probability(self._codes(X), len(self.classes))
+        return Prediction(self.classes, probability, observed, occupancy=self.occupancy(X))
+
+    def occupancy(self, points: ArrayLike) -> OccupancyPrediction:
+        """Return whether something is there, at points (M, 3), metres, world frame; 1/2 where not known.
+
+        Raises
+        ------
+        InputError
+            Points that are not (M, 3) and finite.
+        """
+        found = self.query_occupancy(points)
+        return OccupancyPrediction(found.probability, found.known)
 
     def query_colours(self, points: ArrayLike) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
         """Return the mean colour (M, 3) at points (M, 3), and where there is one (M,); elsewhere it is 0."""

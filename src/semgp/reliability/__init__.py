@@ -1,0 +1,1 @@
+"""How far each label can be trusted, learned without truth from what scans say of the places that they share."""

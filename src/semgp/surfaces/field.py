@@ -1,0 +1,109 @@
+"""A map's continuous field on a lattice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logit
+
+from semgp.errors import InputError
+from semgp.maps.protocol import SpatialMap
+from semgp.parallel import slices
+from semgp.prediction import OccupancyPrediction, Prediction
+from semgp.surfaces.lattice import Box, Lattice
+
+F32 = NDArray[np.float32]
+
+NO_FREE_SPACE = (
+    "the map keeps no free space, and a surface is where that begins: make a GPSemanticMap(..., free=FreeSpace()) "
+    "or a SemanticOctoMap, and update it with clouds that have a T_world_sensor."
+)
+
+Progress = Callable[[int, int], None]
+"""Called with the number of bricks done and of all."""
+
+BATCH = 1 << 17
+"""Points that a map is asked about at once: bounds the memory."""
+
+LEAST, MOST = 1e-4, 16.0
+"""Log-odds are kept this far from the level and no further than that from it.
+
+On the level itself, vertices of different edges would fall together at a node; probabilities of 0 and 1 have no
+finite log-odds, and in single precision none beyond 16.
+"""
+
+
+def require_occupancy(prediction: Prediction) -> OccupancyPrediction:
+    """Return what a prediction says of occupancy.
+
+    Raises
+    ------
+    InputError
+        It says nothing.
+    """
+    if prediction.occupancy is None:
+        raise InputError(NO_FREE_SPACE)
+    return prediction.occupancy
+
+
+def lattice_field(
+    semantic_map: SpatialMap,
+    lattice: Lattice,
+    class_: int | None,
+    level: float,
+    box: Box,
+    progress: Progress | None,
+) -> F32:
+    """Return log-odds of the field minus those of the level on the nodes of B bricks, (B, cells, cells, cells).
+
+    They are positive inside of the surface, and NaN where the map does not know or out of the box. Log-odds cross
+    a surface nearly straight, where probabilities bend, so that two nodes tell well where the level is crossed.
+
+    Parameters
+    ----------
+    semantic_map : SpatialMap
+        A map whose predictions have an occupancy.
+    lattice : Lattice
+        Where to ask.
+    class_ : int or None
+        The field is the probability that something of this class is there; of anything if None.
+    level : float
+        Between 0 and 1.
+    box : Box
+        Nodes outside count as not known.
+    progress : callable, optional
+        See `Progress`.
+
+    Raises
+    ------
+    InputError
+        A map that does not say whether something is there.
+    """
+    shape = (lattice.cells,) * 3
+    values = np.empty((len(lattice), *shape), dtype=np.float32)
+    for part in slices(len(lattice), max(1, BATCH // lattice.cells**3)):
+        X = lattice.nodes(part)
+        g = _log_odds(semantic_map, X, class_, level)
+        g[~box.holds(X)] = np.nan
+        values[part] = g.reshape(-1, *shape)
+        if progress is not None:
+            progress(part.stop, len(lattice))
+    return values
+
+
+def _log_odds(
+    semantic_map: SpatialMap, X: NDArray[np.float64], class_: int | None, level: float
+) -> NDArray[np.floating]:
+    if class_ is None:
+        occupancy = semantic_map.occupancy(X)
+        p = occupancy.probability.astype(np.float64)
+    else:
+        prediction = semantic_map.query(X)
+        occupancy = require_occupancy(prediction)
+        p = occupancy.probability.astype(np.float64) * prediction.probability[:, class_]
+    g = np.clip(logit(p) - logit(level), -MOST, MOST)
+    g = np.copysign(np.maximum(np.abs(g), LEAST), g)
+    g[~occupancy.known] = np.nan
+    return np.asarray(g)
