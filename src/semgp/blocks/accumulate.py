@@ -108,15 +108,13 @@ def add_soft(
 
 
 @njit(cache=True, nogil=True)
-def add_spread(rows: I64, amounts: I64, variances: F64, spread: I64) -> None:
-    """Add mass times variance (N, 3) to each row's sums, and one scan to those of each site that it saw."""
-    seen = np.zeros(len(spread), np.bool_)
+def add_spread(rows: I64, amounts: I64, variances: F64, draws: I64, spread: I64) -> None:
+    """Add mass times variance (N, 3) to each row's sums, and the bits `draws` (N,) to its set of draws."""
     for i in range(len(rows)):
         r = rows[i]
         for d in range(3):
             spread[r, d] += amounts[i] * int(np.rint(variances[i, d] * SPREAD_UNIT))
-        spread[r, 3] += not seen[r]
-        seen[r] = True
+        spread[r, 3] |= draws[i]
 
 
 @njit(cache=True, nogil=True)

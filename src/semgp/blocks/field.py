@@ -58,6 +58,7 @@ class Field:
         features: F32,
         confidence: F32 | None = None,
         variances: F64 | None = None,
+        draws: I64 | None = None,
     ) -> None:
         """Add labelled points, see `Sites.add`; the blocks that they reach are solved again when next needed.
 
@@ -72,7 +73,7 @@ class Field:
                 f"blocks of {self.model.posterior} experts take positions as certain: leave covariances out, or "
                 f"use one of {', '.join(CLOSED)}."
             )
-        touched = self.sites.add(points, labels, weights, features, confidence, variances)
+        touched = self.sites.add(points, labels, weights, features, confidence, variances, draws)
         self.touch(touched)
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

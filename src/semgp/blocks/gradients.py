@@ -42,7 +42,7 @@ def add_gradient(patches: Packed, n_dims: int, kernel: Mixture, noise: Noise, li
     rows_flat, G_flat = np.empty(W_most * n_most, np.float32), np.empty(W_most * m_most, np.float32)
     F_flat, p_flat, work = np.empty_like(G_flat), np.empty_like(G_flat), np.empty(wide, np.float32)
     at_X = at_k = at_present = at_mass = at_Y = at_label = 0
-    U, V = (4, 3) if len(patches.S) else (0, 0)
+    U, V = (5, 3) if len(patches.S) else (0, 0)
     for b in range(len(patches.sizes)):
         n, P, m = patches.sizes[b, 0], patches.sizes[b, 1], patches.sizes[b, 2]
         X = patches.X[at_X : at_X + n_dims * n].reshape(n_dims, n)

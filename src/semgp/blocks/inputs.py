@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from typing import NamedTuple
+from zlib import crc32
 
 import numpy as np
 
-from semgp.blocks.arrays import F32, F64, I32
+from semgp.blocks.arrays import F32, F64, I32, I64
 from semgp.blocks.field import Field
+from semgp.blocks.sites import DRAWS
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 
@@ -23,6 +25,7 @@ class Inputs(NamedTuple):
     features: F32
     confidence: F32 | None
     variances: F64 | None
+    draws: I64 | None
 
 
 def add_cloud(field: Field, cloud: LabelledCloud) -> None:
@@ -54,6 +57,7 @@ def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Inputs:
         columns[keep],
         None if cloud.confidence is None else cloud.confidence[keep],
         None if certain else cloud_variances(cloud[keep]).astype(np.float64),
+        None if certain else cloud_draws(cloud[keep]),
     )
 
 
@@ -63,6 +67,14 @@ def cloud_variances(cloud: LabelledCloud) -> F32:
     if covariances is None:
         return np.zeros((len(cloud), 3), dtype=np.float32)
     return np.diagonal(covariances, axis1=1, axis2=2).astype(np.float32)
+
+
+def cloud_draws(cloud: LabelledCloud) -> I64:
+    """Return one bit (N,) a point: the same for all where the pose is uncertain, else each its own, by a hash."""
+    if cloud.pose_covariance is not None and cloud.T_world_sensor is not None:
+        return np.full(len(cloud), 1 << crc32(cloud.T_world_sensor.tobytes()) % DRAWS, dtype=np.int64)
+    steps = np.rint(cloud.points * 1e4).astype(np.int64) @ np.array([73_856_093, 19_349_663, 83_492_791])
+    return np.asarray(np.left_shift(1, (steps >> 3) % DRAWS), dtype=np.int64)
 
 
 def cloud_features(cloud: LabelledCloud, names: tuple[str, ...]) -> F32:

@@ -19,6 +19,10 @@ from semgp.voxels import STEP
 
 COARSE_BITS = 2
 
+WORD_BITS = 24
+WORD = (1 << WORD_BITS) - 1
+"""A set of draws in words that single precision holds exactly."""
+
 _OFFSETS = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)])
 
 
@@ -28,9 +32,9 @@ class Layout(NamedTuple):
     cells (L,): ids. start (L + 1,): where each cell's sites begin. row (S,): index of each site in `Sites`.
     X (S, D): position in metres from the cell's lowest corner, and features. first (S + L,): where each coarse
     voxel's sites begin, and the last one's end, from `start[i] + i` on for cell i. n_coarse (L,): coarse voxels of
-    each cell. centre (S, D): mean of the sites of each coarse voxel, from `start[i]` on. S (S, 3): variance of
-    each position, m^2; (0, 3) if all are certain. mass (sites, C): class mass of all sites of the map, in steps of
-    `unit`.
+    each cell. centre (S, D): mean of the sites of each coarse voxel, from `start[i]` on. S (S, 5): variances of
+    each position, m^2, and its set of draws in two words; (0, 5) if all are certain. mass (sites, C): class mass
+    of all sites of the map, in steps of `unit`.
     """
 
     cells: I32
@@ -53,7 +57,7 @@ def lay_out(sites: Sites, cells: I32) -> Layout:
     row, first = np.empty(S, np.int32), np.empty(S + len(cells), np.int32)
     X, centre = np.empty((S, D), np.float32), np.empty((S, D), np.float32)
     n_coarse = np.zeros(len(cells), np.int32)
-    spread = np.empty((S if len(sites.spread) else 0, 4), np.float32)
+    spread = np.empty((S if len(sites.spread) else 0, 5), np.float32)
     layout = Layout(cells, start, row, X, first, n_coarse, centre, spread, sites.mass, 1.0 / MASS_UNIT)
 
     def fill(part: slice) -> None:
@@ -119,7 +123,7 @@ def _fill(
             if len(S):
                 for d in range(3):
                     S[s, d] = spread[r, d] / (total * float(SPREAD_UNIT))
-                S[s, 3] = max(spread[r, 3], 1)
+                S[s, 3], S[s, 4] = spread[r, 3] & WORD, spread[r, 3] >> WORD_BITS
             for d in range(3, D):
                 X[s, d] = place[r, d] / (total * float(FEATURE_UNIT))
             if codes[order[j]] >> 6 != previous:

@@ -23,7 +23,7 @@ class Sizes(NamedTuple):
 class Members(NamedTuple):
     """The members of one block.
 
-    X (D, total): positions and features. S (4, total): variances of the positions, and scans that saw them; (0,
+    X (D, total): positions and features. S (5, total): variances of the positions, and two words of draws; (0,
     total) if all are certain. mass (total, C). k (total,): sites joined.
     """
 
@@ -192,12 +192,15 @@ def _add_coarse(
         for d in range(out.X.shape[0]):
             out.X[d, n] += layout.X[s, d]
         for d in range(len(out.S)):
-            out.S[d, n] += layout.S[s, d]
+            if d < 3:
+                out.S[d, n] += layout.S[s, d]
+            else:
+                out.S[d, n] = int(out.S[d, n]) | int(layout.S[s, d])
         for c in range(layout.mass.shape[1]):
             out.mass[n, c] += layout.mass[layout.row[s], c] * layout.unit
     for d in range(out.X.shape[0]):
         out.X[d, n] /= k
-    for d in range(len(out.S)):
+    for d in range(min(len(out.S), 3)):
         out.S[d, n] /= k
     out.X[0, n] += dx
     out.X[1, n] += dy

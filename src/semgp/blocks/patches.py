@@ -14,7 +14,7 @@ from semgp.blocks.solved import Solved, class_mass
 class Patch(NamedTuple):
     """A block, unsolved, and held-out points in its leaf.
 
-    X (D, n), S (4, n) or (0, n), k (n,): members. present (P,). mass (P, n). Y (D, m), SY (3, m) or (0, m), label
+    X (D, n), S (5, n) or (0, n), k (n,): members. present (P,). mass (P, n). Y (D, m), SY (3, m) or (0, m), label
     (m,): held-out points, the variances of their positions, and their classes.
     """
 

@@ -31,6 +31,9 @@ CELL_BITS = 6
 CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
 
+DRAWS = 48
+"""Bits of a site's set of draws, see `Sites.spread`."""
+
 _LARGEST_WEIGHT, _LARGEST_FEATURE, _LARGEST_VARIANCE = 64, 30_000, 100
 
 
@@ -90,9 +93,10 @@ class Sites:
 
     @property
     def spread(self) -> I64:
-        """Mass times variance of position, summed along three axes, and scans (S, 4).
+        """Mass times variance of position, summed along three axes, and the set of draws (S, 4).
 
-        (0, 4) as long as all positions are certain.
+        Points that are displaced together, those of one scan, are one draw. A set has 48 bits; two draws of many
+        may share one. (0, 4) as long as all positions are certain.
         """
         return self._spread[: len(self)]
 
@@ -134,6 +138,7 @@ class Sites:
         features: F32,
         confidence: F32 | None = None,
         variances: F64 | None = None,
+        draws: I64 | None = None,
     ) -> I32:
         """Add labelled points, hard or soft, and return the cells that they lie in.
 
@@ -151,6 +156,8 @@ class Sites:
             What each label counts, 0 to 1.
         variances : (N, 3) array, optional
             Variance of each position, m^2.
+        draws : (N,) array, optional
+            With variances, one of `DRAWS` bits a point: points displaced together have the same.
 
         Raises
         ------
@@ -180,6 +187,7 @@ class Sites:
             labels = None if labels is None else labels[heavy]
             weights = None if weights is None else weights[heavy]
             variances = None if variances is None else variances[heavy]
+            draws = None if draws is None else draws[heavy]
         if not len(points):
             return np.empty(0, dtype=np.int32)
         origin = self.origin
@@ -195,9 +203,9 @@ class Sites:
             add_hard(rows, labels, *where)
         elif weights is not None:
             add_soft(rows, weights, *where)
-        if variances is not None:
+        if variances is not None and draws is not None:
             self._spread = _extended(self._spread, len(self), 0)
-            add_spread(rows, amounts, variances, self._spread)
+            add_spread(rows, amounts, variances, draws, self._spread)
         touched = np.zeros(len(self.cells), dtype=bool)
         touched[self._cell[rows]] = True
         return np.flatnonzero(touched).astype(np.int32)

@@ -76,7 +76,7 @@ def solve_cells(
         Room for the blocks' factors.
     """
     T, D, C = sizes.total, layout.X.shape[1], layout.mass.shape[1]
-    U = 4 if len(layout.S) else 0
+    U = 5 if len(layout.S) else 0
     B = leaves.sum()
     solved = Solved(
         np.zeros(B, np.int32),
@@ -193,8 +193,8 @@ def solve_block(
 
     Parameters
     ----------
-    X, S, k : (D, .), (4, .) or (0, .), (.,) arrays
-        Positions, their variances and scans, and the number of sites joined, of the first n members.
+    X, S, k : (D, .), (5, .) or (0, .), (.,) arrays
+        Positions, their variances and draws, and the number of sites joined, of the first n members.
     n : int
         Members.
     present : (P,) array

@@ -15,8 +15,8 @@ SHARED = 3
 class Solved(NamedTuple):
     """Posteriors of some cells' blocks, one after the other.
 
-    n (B,): members. X (B, D, total), k (B, total): their positions, and the sites that they join. S (B, 4, total):
-    variances of the positions, and scans that saw them; (B, 0, total) if all are certain. n_present (B,), present
+    n (B,): members. X (B, D, total), k (B, total): their positions, and the sites that they join. S (B, 5, total):
+    variances of the positions, and two words of draws; (B, 0, total) if all are certain. n_present (B,), present
     (B, C): the classes with mass in the block. at (B + 1,), coefficients: where in the flat array each block's (3
     + 3 P, n) coefficients begin. at_factor (B + 1,), factor: the same for the inverse Cholesky factors, lower
     triangles row by row.

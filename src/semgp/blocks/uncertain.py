@@ -8,9 +8,10 @@ it closest to the expectation in three dimensions: at worst .035 of sf^2 away fo
 1/2, over errors up to 2.5 length scales. It is the kernel of Paciorek and Schervish (2004), which is positive
 definite, each point scaled by a factor of its own.
 
-The points of one scan move together: what a site says of one scan is the field at one place, wherever that is,
-with the prior's full variance. The mean over several scans is that of several places: its variance is the
-covariance of two of them, plus what it lacks to the prior's over the number of scans.
+The points of one scan are displaced together: between two of them the kernel is the plain one, and so it is
+between a point and itself. What a site says is the mean over a set of draws, A, and another's over B: their
+covariance is the plain one with the share w = |A and B| / (|A| |B|), and the expected one with the rest. Points to
+be predicted share no draw.
 """
 
 from __future__ import annotations
@@ -51,16 +52,17 @@ def cross_covariance(Z: F32, SZ: F32, n: int, X: F32, SX: F32, m: int, kernel: M
 def member_covariance(X: F32, S: F32, n: int, kernel: Mixture, K: F32, work: F32) -> None:
     """Fill the lower triangle of K (n, n) with the covariances of the first n columns of X (D, .).
 
-    S (4, .) are the variances of their positions and the scans that saw them, (0, .) where they are certain.
+    S (5, .) are the variances of their positions and their sets of draws, (0, .) where they are certain.
     """
+    covariance_lower(X, n, kernel, K, work)
     if len(S) == 0:
-        covariance_lower(X, n, kernel, K, work)
         return
-    gain = np.empty(n, np.float32)
-    variance = kernel.variance.sum()
+    gain, expected = np.empty(n, np.float32), np.empty(n, np.float32)
+    size = _set_sizes(S, n)
     for j in range(n):
-        _expected_row(X, j, S[:, j], X, S, min((j | 15) + 1, n), kernel, K[j], work, gain)
-        K[j, j] += (variance - K[j, j]) / S[3, j]
+        _expected_row(X, j, S[:, j], X, S, j + 1, kernel, expected, work, gain)
+        for q in range(j + 1):
+            K[j, q] = expected[q] + _shared(S, size, j, q) * (K[j, q] - expected[q])
 
 
 @njit(cache=True, nogil=True)
@@ -75,7 +77,7 @@ def cross_derivative(
     for j in range(n):
         for d in range(len(SZ)):
             s[d] = SZ[d, j]
-        _expected_derivative(Z, j, s, X, SX, m, -1, kernel, H[j], sign, out)
+        _expected_derivative(Z, j, s, X, SX, m, kernel, H[j], sign, out)
 
 
 @njit(cache=True, nogil=True)
@@ -84,15 +86,39 @@ def member_derivative(X: F32, S: F32, n: int, kernel: Mixture, H: F32, sign: flo
     if len(S) == 0:
         derivative_tile(X, n, X, n, kernel, H, sign, out, work)
         return
-    certain, alone = np.empty((0, 1), np.float32), np.empty(1, np.float32)
+    size, plain, expected = _set_sizes(S, n), np.empty((n, n), np.float32), np.empty(n, np.float32)
     for j in range(n):
-        _expected_derivative(X, j, S[:, j], X, S, n, j, kernel, H[j], sign, out)
-        # the diagonal
-        own, share = X[:, j : j + 1], 1 / S[3, j]
-        alone[0] = H[j, j] * (1 - share)
-        _expected_derivative(X, j, 2 * S[:, j], own, certain, 1, -1, kernel, alone, sign, out)
-        alone[0] = H[j, j] * share
-        _expected_derivative(X, j, 0 * S[:, j], own, certain, 1, -1, kernel, alone, sign, out)
+        for q in range(n):
+            plain[j, q] = _shared(S, size, j, q) * H[j, q]
+            expected[q] = H[j, q] - plain[j, q]
+        _expected_derivative(X, j, S[:, j], X, S, n, kernel, expected, sign, out)
+    derivative_tile(X, n, X, n, kernel, plain, sign, out, work)
+
+
+@njit(cache=True, nogil=True)
+def _set_sizes(S: F32, n: int) -> F32:
+    size = np.empty(n, np.float32)
+    for j in range(n):
+        size[j] = max(_ones(np.uint32(S[3, j])) + _ones(np.uint32(S[4, j])), 1)
+    return size
+
+
+@njit(cache=True, nogil=True)
+def _shared(S: F32, size: F32, j: int, q: int) -> np.float32:
+    """Share of the pairs of draws of members j and q that are one draw; a member without draws is its own."""
+    both = _ones(np.uint32(S[3, j]) & np.uint32(S[3, q])) + _ones(np.uint32(S[4, j]) & np.uint32(S[4, q]))
+    if j == q:
+        return np.float32(1 / size[j])
+    return np.float32(both / (size[j] * size[q]))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _ones(word: np.uint32) -> int:
+    """Number of bits that are set."""
+    v = word - ((word >> np.uint32(1)) & np.uint32(0x55555555))
+    v = (v & np.uint32(0x33333333)) + ((v >> np.uint32(2)) & np.uint32(0x33333333))
+    v = (v + (v >> np.uint32(4))) & np.uint32(0x0F0F0F0F)
+    return int((v * np.uint32(0x01010101)) & np.uint32(0xFFFFFFFF)) >> 24
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -141,17 +167,15 @@ def _expected_row(
 
 @njit(cache=True, nogil=True)
 def _expected_derivative(
-    Z: F32, j: int, s: F32, X: F32, SX: F32, m: int, skip: int, kernel: Mixture, h: F32, sign: float, out: F64
+    Z: F32, j: int, s: F32, X: F32, SX: F32, m: int, kernel: Mixture, h: F32, sign: float, out: F64
 ) -> None:
-    """One row of the derivatives, without column `skip`."""
+    """One row of the derivatives."""
     kind, weight, variance = kernel
     D = weight.shape[1]
     g = np.ones(D, np.float32)
     for k in range(len(kind)):
         per = np.float32(_PER_WEIGHT[kind[k]])
         for q in range(m):
-            if q == skip:
-                continue
             r2, gain = np.float32(0), _ONE
             for d in range(D):
                 sd = np.float32(0)
