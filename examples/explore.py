@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 RADIUS, CLEARANCE = 0.2, 0.3  # metres: the robot's, and the one it plans with
 CELL, HEIGHTS = 0.2, (0.15, 1.15)  # of the grid that it plans on: what stands as high as the robot
-SCAN_EVERY = 2.0  # metres of way between two scans, if the goal is farther
+SCAN_EVERY = 99.0  # metres of way between two scans, if the goal is farther
 VIEWS = 24  # places whose information gain is compared
 STRATEGIES = {"information per metre": "#c4161c", "nearest frontier": "#3465a4", "random goal": "#8a8a84"}
 
