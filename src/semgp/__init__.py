@@ -10,7 +10,11 @@ if TYPE_CHECKING:
     from semgp.cloud import LabelledCloud
     from semgp.errors import FileFormatError, InputError, MissingExtraError, SemgpError
     from semgp.gp.model import GPModel
+    from semgp.maps.committee import Committee
     from semgp.maps.files import load_map, save_map
+    from semgp.maps.forgetting import Forgetting
+    from semgp.maps.free_space import FreeSpace
+    from semgp.maps.fusion import fuse
     from semgp.maps.gp import GPSemanticMap
     from semgp.maps.learning import learn_model
     from semgp.maps.presets import PRESETS
@@ -26,7 +30,10 @@ __all__ = [
     "PRESETS",
     "BlockModel",
     "Classes",
+    "Committee",
     "FileFormatError",
+    "Forgetting",
+    "FreeSpace",
     "GPModel",
     "GPSemanticMap",
     "InputError",
@@ -35,6 +42,7 @@ __all__ = [
     "Prediction",
     "SemanticOctoMap",
     "SemgpError",
+    "fuse",
     "learn_blocks",
     "learn_from_scans",
     "learn_model",
@@ -56,6 +64,10 @@ _HOME = {
     "GPModel": "semgp.gp.model",
     **dict.fromkeys(("load_map", "save_map"), "semgp.maps.files"),
     "GPSemanticMap": "semgp.maps.gp",
+    "FreeSpace": "semgp.maps.free_space",
+    "Forgetting": "semgp.maps.forgetting",
+    "fuse": "semgp.maps.fusion",
+    "Committee": "semgp.maps.committee",
     "learn_model": "semgp.maps.learning",
     "SemanticOctoMap": "semgp.octomap",
     "Prediction": "semgp.prediction",

@@ -20,6 +20,9 @@ app.command("semgp.cli.build:learn")
 app.command("semgp.cli.maps:query")
 app.command("semgp.cli.maps:evaluate")
 app.command("semgp.cli.maps:info")
+app.command("semgp.cli.space:fuse")
+app.command("semgp.cli.space:surface")
+app.command("semgp.cli.space:slice_", name="slice")
 app.command(reproduce)
 
 

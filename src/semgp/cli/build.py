@@ -17,6 +17,8 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
 from semgp.gp.model import GPModel
 from semgp.maps.files import save_map
+from semgp.maps.forgetting import Forgetting
+from semgp.maps.free_space import FreeSpace
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.kinds import MAP_KINDS
 from semgp.maps.learning import learn_model
@@ -40,6 +42,8 @@ def build(
     resolution: float | None = None,
     vertical: Axis = "z",
     learn: bool = True,
+    free_space: bool = False,
+    half_life: float | None = None,
     max_points: int = 5000,
     inducing: int = 300,
     iterations: int = 30,
@@ -51,6 +55,8 @@ def build(
     Example: semgp build room.ply --out room.semgp
 
     Example: semgp build sequences/08 --model outdoor-lidar --out drive.semgp
+
+    Example: semgp build sequences/08 --model outdoor-lidar --half-life 30 --out drive.semgp
 
     Parameters
     ----------
@@ -70,6 +76,12 @@ def build(
     learn
         With two scans or more, learn the model from their labels, from the preset on; a model file is taken as it
         is. The paper's GP learns from the first scan.
+    free_space
+        The GP keeps free space, too, from the rays of scans with a pose: "semgp query" then says what is occupied,
+        and "semgp surface" and "semgp slice" have something to work on.
+    half_life
+        Keep free space and forget: labels lose half their weight in so many scans, and what rays pass through is
+        given up.
     max_points
         The paper's GP: at most so many labelled points, drawn at random, train it.
     inducing
@@ -81,6 +93,8 @@ def build(
     quiet
         Show no progress.
     """
+    if (free_space or half_life is not None) and (kind != "gp" or model == PAPER):
+        raise InputError("--free-space and --half-life are for the GP map of many blocks: leave them out.")
     sources = _sources(scans)
     with progress(quiet) as bars:
         semantic_map: SemanticMap
@@ -95,7 +109,9 @@ def build(
             labelled = [cloud for cloud in sources if cloud.labelled.any()]
             if learn and model in PRESETS and len(labelled) > 1:
                 blocks = _learn_blocks(labelled, blocks, vertical, seed, bars)
-            semantic_map = GPSemanticMap(sources[0].classes, blocks)
+            free = FreeSpace() if free_space or half_life is not None else None
+            forgetting = None if half_life is None else Forgetting(half_life)
+            semantic_map = GPSemanticMap(sources[0].classes, blocks, free=free, forgetting=forgetting)
         for cloud in bars.track(sources, description="building the map"):
             semantic_map.update(cloud)
         if not len(semantic_map):

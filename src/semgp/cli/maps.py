@@ -42,7 +42,8 @@ def query(
     map_file
         A map that `semgp build` wrote.
     out
-        The file to write: .ply (label, class colour, probabilities, entropy, variance) or .npz.
+        The file to write: .ply or .npz, with label, class colour, probabilities, entropy, variance and, from maps
+        with free space, occupancy and state (1 occupied, 0 free, -1 unknown).
     points
         A point file: the query points.
     resolution
@@ -120,10 +121,12 @@ def info(map_file: Path, /, *, json: Annotated[bool, Parameter(negative="")] = F
 
 def write_prediction(path: Path, points: np.ndarray, prediction: Prediction) -> None:
     """Write a prediction at points as .ply or .npz."""
-    fields = {"confidence": prediction.confidence, "entropy": prediction.entropy}
+    fields: dict[str, np.ndarray] = {"confidence": prediction.confidence, "entropy": prediction.entropy}
     if prediction.variance is not None:
         best = prediction.probability.argmax(axis=1)
         fields["variance"] = np.take_along_axis(prediction.variance, best[:, None], axis=1)[:, 0]
+    if prediction.occupancy is not None:
+        fields |= {"occupancy": prediction.occupancy.probability, "state": prediction.occupancy.state}
     classes, label = prediction.classes, prediction.label
     if path.suffix == ".npz":
         weights = prediction.probability.astype(np.float32)
