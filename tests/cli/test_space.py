@@ -27,12 +27,12 @@ def built(scan: Path) -> Path:
     return out
 
 
-def test_query_tells_what_is_occupied(built: Path) -> None:
-    out = built.with_name("grid.npz")
-    assert run("query", built, "--resolution", "0.25", "--out", out, "--quiet") == 0
+def test_query_tells_what_is_occupied(built: Path, scan: Path) -> None:
+    out = built.with_name("points.npz")
+    assert run("query", built, "--points", scan, "--out", out, "--quiet") == 0
     with np.load(out) as answer:
         assert (answer["occupancy"] > 0.5).mean() > 0.9
-        assert set(np.unique(answer["state"])) <= {-1, 0, 1}
+        assert (answer["state"] == 1).mean() > 0.9
 
 
 def test_fuse_with_itself_moved_back(built: Path, tmp_path: Path) -> None:
@@ -66,11 +66,11 @@ def test_slice(built: Path, tmp_path: Path) -> None:
         ("half_life must be a number, positive", ("build", "{scan}", "--out", "{out}", "--half-life", "-1")),
         ("keeps no free space", ("surface", "{plain}", "--resolution", "0.1", "--out", "{out}.ply")),
         ("written as .ply", ("surface", "{built}", "--resolution", "0.1", "--out", "{out}")),
-        ("no class is called 'sofa'", ("surface", "{built}", "--resolution", "0.1", "--of", "sofa", "--out", "{out}.ply")),
+        ("called 'sofa'", ("surface", "{built}", "--resolution", "0.1", "--of", "sofa", "--out", "{out}.ply")),
         ("is no 4 x 4 matrix", ("fuse", "{built}", "{built}", "--transform", "{scan}", "--out", "{out}")),
         ("cannot be read", ("fuse", "{built}", "{built}", "--transform", "{out}.txt", "--out", "{out}")),
         ("only GP maps", ("fuse", "{built}", "{knn}", "--out", "{out}")),
-        ("cannot be read", ("slice", "{built}", "--heights", "0", "1", "--costs", "{out}.json", "--out", "{out}.yaml")),
+        ("cannot be read", ("slice", "{built}", "--heights", "0", "1", "--costs", "{out}.json", "--out", "{out}.y")),
     ],
 )  # fmt: skip
 def test_bad_input(
@@ -86,10 +86,7 @@ def test_bad_input(
         names["plain" if kind == "gp" else kind] = tmp_path / f"{kind}.semgp"
         run("build", scan, "--kind", kind, "--out", tmp_path / f"{kind}.semgp", "--quiet")
     capsys.readouterr()
-    assert (
-        run(*(a.format(**names) for a in arguments), *(() if arguments[0] in ("fuse", "slice") else ("--quiet",)))
-        == 2
-    )
+    assert run(*(a.format(**names) for a in arguments)) == 2
     captured = capsys.readouterr()
     assert message in " ".join((captured.err + captured.out).split())
     assert not list(tmp_path.glob("out*"))

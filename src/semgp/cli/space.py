@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import Annotated
 
 import numpy as np
+from cyclopts import Parameter
 
 from semgp.checks import rigid_transform
 from semgp.cli.console import STDOUT, progress
@@ -17,7 +18,7 @@ from semgp.maps.gp import GPSemanticMap
 from semgp.maps.protocol import SpatialMap
 from semgp.octomap import SemanticOctoMap
 
-Axis = Literal["x", "y", "z"]
+Pair = Annotated[tuple[float, float], Parameter(negative="")]
 
 
 def fuse(map_file: Path, other: Path, /, *, out: Path, transform: Path | None = None) -> None:
@@ -96,9 +97,9 @@ def slice_(
     /,
     *,
     out: Path,
-    heights: tuple[float, float],
-    low: tuple[float, float] | None = None,
-    high: tuple[float, float] | None = None,
+    heights: Pair,
+    low: Pair | None = None,
+    high: Pair | None = None,
     resolution: float | None = None,
     costs: Path | None = None,
 ) -> None:
