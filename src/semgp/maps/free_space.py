@@ -68,11 +68,11 @@ class FreeSpace:
     """
 
     model: BlockModel | None = None
-    rays: int = 32_768
-    weight: float = 0.5
+    rays: int = 24_576
+    weight: float = 0.7
     margin: float = 1.0
-    near: float = 3.0
-    thin: int = 8
+    near: float = 1.5
+    thin: int = 6
     reach: float | None = None
     seed: int = 0
 

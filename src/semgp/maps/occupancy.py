@@ -53,8 +53,9 @@ class Occupancy:
 
     def add(self, rays: Rays) -> None:
         """Add what `sample` gave."""
-        weights = np.diag([self.free.weight, 1.0]).astype(np.float32)[rays.labels]
-        self.field.add(rays.points, None, weights, np.empty((len(rays.points), 0), dtype=np.float32))
+        confidence = np.where(rays.labels == FREE, np.float32(self.free.weight), np.float32(1))
+        nothing = np.empty((len(rays.points), 0), dtype=np.float32)
+        self.field.add(rays.points, rays.labels, None, nothing, confidence)
 
     def sample(self, cloud: LabelledCloud, watch: bool = False) -> Rays:
         """Return the points of a cloud, as occupied, and samples along its rays, as free.
@@ -77,7 +78,9 @@ class Occupancy:
             sensor[None], resolution, origin
         )  # samples lie between sensor and points: both must be in range
         reach = np.inf if free.reach is None else free.reach
-        hits = cloud.points[((cloud.points - sensor) ** 2).sum(axis=1) <= reach**2]
+        hits = cloud.points
+        if free.reach is not None:
+            hits = hits[((hits - sensor) ** 2).sum(axis=1) <= reach**2]
         walk = Walk(
             resolution, origin.astype(np.float64), free.rays / len(cloud), free.seed, free.margin * resolution,
             free.near * resolution, free.thin, reach,
