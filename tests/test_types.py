@@ -1,12 +1,15 @@
 """The types that travel: what they accept, what they refuse, what they say."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.prediction import Prediction
+from semgp.prediction import OccupancyPrediction, Prediction
 
 TWO = Classes(("floor", "wall"))
 POINTS = np.arange(12.0).reshape(4, 3)
@@ -110,3 +113,72 @@ class TestPrediction:
     def test_shapes_must_agree(self) -> None:
         with pytest.raises(InputError, match="variance must have shape"):
             Prediction(TWO, np.ones((3, 2)) / 2, np.ones(3, bool), variance=np.ones((3, 1)))
+
+
+def posed(**fields: Any) -> LabelledCloud:
+    rng = np.random.default_rng(0)
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.3, -0.5, 1.0]).as_matrix()
+    T[:3, 3] = 4, -2, 1
+    return LabelledCloud(rng.normal(scale=5, size=(20, 3)), Classes(("a",)), T_world_sensor=T, **fields)
+
+
+def test_a_pose_covariance_moves_the_points_as_it_moves_the_pose() -> None:
+    """Against the spread of the points over poses drawn from the covariance."""
+    rng = np.random.default_rng(1)
+    root = 1e-3 * rng.normal(size=(6, 6))
+    cloud = posed(pose_covariance=root @ root.T)
+    assert cloud.origin is not None
+    draws = rng.normal(size=(40_000, 6)) @ root.T
+    turned = Rotation.from_rotvec(draws[:, 3:])
+    for i in (0, 7, 19):
+        places = turned.apply(cloud.points[i] - cloud.origin) + cloud.origin + draws[:, :3]
+        found = cloud.position_covariances
+        assert found is not None
+        assert np.allclose(found[i], np.cov(places.T), atol=0.04 * np.trace(found[i]))
+
+
+def test_sensor_noise_adds_to_that_of_the_pose() -> None:
+    noise = np.tile(np.diag([0.1, 0.2, 0.3]), (20, 1, 1))
+    alone, both = posed(covariances=noise), posed(covariances=noise, pose_covariance=0.01 * np.eye(6))
+    pose = posed(pose_covariance=0.01 * np.eye(6))
+    assert posed().position_covariances is None
+    assert alone.position_covariances is not None
+    assert both.position_covariances is not None
+    assert pose.position_covariances is not None
+    assert np.array_equal(alone.position_covariances, noise)
+    assert np.allclose(both.position_covariances, noise + pose.position_covariances)
+    part = both[::3]
+    assert part.position_covariances is not None
+    assert np.allclose(part.position_covariances, both.position_covariances[::3])
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"confidence": np.full(20, 1.5)}, "between 0"),
+        ({"confidence": np.full(20, np.nan)}, "between 0"),
+        ({"confidence": np.ones(3)}, r"shape \(20,\)"),
+        ({"covariances": np.zeros((20, 3))}, r"shape \(20, 3, 3\)"),
+        ({"covariances": np.full((20, 3, 3), np.inf)}, "NaN or infinite"),
+        ({"covariances": np.tile(-np.eye(3), (20, 1, 1))}, "in 20 of 20 rows"),
+        ({"covariances": np.tile(np.triu(np.ones((3, 3))), (20, 1, 1))}, "symmetric"),
+        ({"pose_covariance": np.eye(3)}, r"shape \(6, 6\)"),
+        ({"pose_covariance": np.diag([1, 1, 1, 1, 1, -1])}, "symmetric without negative eigenvalues"),
+        ({"stamp": np.inf}, "stamp must be a time"),
+    ],
+)
+def test_uncertainties_that_cannot_be(fields: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        posed(**fields)
+
+
+def test_occupancy_states() -> None:
+    known = np.array([True, True, False])
+    occupancy = OccupancyPrediction(np.array([0.9, 0.1, 0.9]), known)
+    assert occupancy.state.tolist() == [1, 0, -1]
+    assert np.allclose(occupancy.entropy, 0.325083, atol=1e-6)
+    with pytest.raises(InputError, match="one shape"):
+        OccupancyPrediction(np.ones(2), known)
+    with pytest.raises(InputError, match="occupancy must be of 2 points"):
+        Prediction(Classes(("a",)), np.ones((2, 1)), known[:2], occupancy=occupancy)
