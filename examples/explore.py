@@ -2,18 +2,18 @@
 
     uv run examples/explore.py --out explore.png
 
-A round robot with a small lidar comes in at the western end of the corridor. It knows only its map: it drives where
-that is free, to goals that it picks by the information that a scan is expected to give for each metre of way, by the
-nearest frontier of the unknown, or by chance, and scans at each goal and every two metres on the way. All three have
-the same start, sensor and number of scans.
+A round robot with a small lidar comes in at the western end of the corridor. It knows its map and nothing else: it
+drives to where the map says that nothing is, scans there, and chooses again. It chooses the place whose scan is
+expected to tell most for each metre of way, the place nearest to a frontier of the unknown, or any place. All three
+have the same start, sensor and number of scans, in the same buildings.
 
-Above: how much of the floor and of the surfaces that can be seen is known, over metres driven and over scans, as
-means over the buildings, each a thin line. Below: what each robot has mapped of the first building, walls and
-furniture in the colours of their classes, with its way, from the star to the circle.
+Above: how much of the surfaces that can be seen is known, over metres driven and over scans, and how uncertain
+the map is on average about what is free; thick lines are means over the buildings. Below: what each robot has mapped
+of the first building, seen from above, in the colours of the classes; grey is unknown, thin lines are the true rooms.
+The way leads from the star to the circle, with a dot for each scan.
 """
 
 import argparse
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,11 +22,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from semgp.classes import MISSING
 from semgp.maps.free_space import FreeSpace
@@ -38,18 +39,51 @@ from semgp.prediction import FREE
 from semgp.scene.building import SyntheticBuilding
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
-RADIUS, CLEARANCE = 0.2, 0.3  # metres: the robot's, and the one it plans with
-CELL, HEIGHTS = 0.2, (0.15, 1.15)  # of the grid that it plans on: what stands as high as the robot
-SCAN_EVERY = 99.0  # metres of way between two scans, if the goal is farther
-VIEWS = 24  # places whose information gain is compared
-STRATEGIES = {"information per metre": "#c4161c", "nearest frontier": "#3465a4", "random goal": "#8a8a84"}
+RADIUS, CLEARANCE = 0.2, 0.3  # metres: the robot's own, and the one it plans with
+CELL, HEIGHTS = (
+    0.2,
+    (0.15, 1.15),
+)  # metres: the grid it plans on, and between which heights it could touch something
+NEW_PLACE = 0.5  # metres from all earlier scans
+SQUARE, RAYS = 1.5, {"beams": 8, "columns": 24}  # one view a square is rated, by so many rays
+FRONTIER_CELLS, FRONTIER_IN_VIEW = (
+    8,
+    1.0,
+)  # size of a frontier worth a visit, and metres to it from where it is seen
 
 
 def new_map(building: SyntheticBuilding) -> SpatialMap:
-    """Return an empty map; any other that keeps free space does, such as SemanticOctoMap(building.classes, 0.1)."""
-    free = FreeSpace(rays=2048)
-    return GPSemanticMap(building.classes, replace(GENERAL, resolution=0.1), tolerance=0.2, free=free)
+    """Return an empty map. Others that keep free space do as well, such as SemanticOctoMap(building.classes, 0.1)."""
+    model = replace(GENERAL, resolution=0.1)
+    return GPSemanticMap(building.classes, model, tolerance=0.2, free=FreeSpace(rays=2048))
+
+
+class Truth:
+    """What is true of a building, to judge maps by; robots never see it."""
+
+    def __init__(self, building: SyntheticBuilding) -> None:
+        rng = np.random.default_rng(0)
+        surfaces = building.surfaces(RADIUS, resolution=0.2)
+        surfaces = surfaces[rng.permutation(len(surfaces))[:6000]]
+        floor = rng.permutation(building.reachable(RADIUS))[:2000]
+        space = rng.uniform(0, building.size, (4000, 3))
+        self.labels = surfaces.hard_labels
+        self.points = np.vstack([surfaces.points, np.insert(floor, 2, 0.5, axis=1), space])
+        self.borders = [len(surfaces), len(surfaces) + len(floor)]
+
+    def judge(self, semantic_map: SpatialMap) -> tuple[float, float, float, float]:
+        """Return which shares of surfaces and floor are known, of known labels right, and the mean entropy (nats)."""
+        prediction = semantic_map.query(self.points)
+        occupancy = prediction.occupancy
+        assert occupancy is not None
+        label, *_ = np.split(prediction.label, self.borders)
+        _, floor, _ = np.split(occupancy.state, self.borders)
+        *_, entropy = np.split(np.where(occupancy.known, occupancy.entropy, np.log(2)), self.borders)
+        seen = label != MISSING
+        right = label[seen] == self.labels[seen]
+        return float(seen.mean()), float((floor == FREE).mean()), float(right.mean()), float(entropy.mean())
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,175 +95,216 @@ class Roads:
     before: NDArray[np.int32]
 
     def way_to(self, i: int) -> Array:
-        """Return the places (m, 2) on the way to a cell, from the robot on."""
+        """Return the places (m, 2) on the way to cell i, from the robot on."""
         way = [i]
         while self.before[way[-1]] >= 0:
             way.append(int(self.before[way[-1]]))
         return self.cells[way[::-1]]
 
 
-class Truth:
-    """What is true of a building, to judge a map by; the robot never sees it."""
-
-    def __init__(self, building: SyntheticBuilding) -> None:
-        rng = np.random.default_rng(0)
-        surfaces = building.surfaces(RADIUS, resolution=0.2)
-        surfaces = surfaces[rng.permutation(len(surfaces))[:6000]]
-        floor = rng.permutation(building.reachable(RADIUS))[:2000]
-        self.labels = surfaces.hard_labels
-        space = rng.uniform(0, building.size, (4000, 3))
-        self.points = np.vstack([surfaces.points, np.column_stack([floor, np.full(len(floor), 0.5)]), space])
-        self.parts = np.split(np.arange(len(self.points)), [len(surfaces), len(surfaces) + len(floor)])
-
-    def judge(self, semantic_map: SpatialMap) -> tuple[float, float, float, float]:
-        """Return the shares of floor and surfaces that are known, of known labels that are right, and the entropy."""
-        prediction = semantic_map.query(self.points)
-        assert prediction.occupancy is not None
-        surfaces, floor, space = self.parts
-        label = prediction.label[surfaces]
-        seen = label != MISSING
-        entropy = np.where(prediction.occupancy.known, prediction.occupancy.entropy, np.log(2))[space]
-        floor_known = prediction.occupancy.state[floor] == FREE
-        return floor_known.mean(), seen.mean(), (label == self.labels)[seen].mean(), entropy.mean()
-
-
 @dataclass(eq=False)
 class Robot:
-    """A robot in a building, its map, and its records: a row for each scan."""
+    """A robot in a building with its map; a row of `records` for each scan: metres driven, and what `Truth` says."""
 
     building: SyntheticBuilding
     truth: Truth
+    map: SpatialMap
     rng: np.random.Generator
-    map: SpatialMap = field(init=False)
-    position: Array = field(init=False)
+    metres: float = 0.0
     way: list[Array] = field(default_factory=list)
     scanned_at: list[Array] = field(default_factory=list)
+    touched: list[Array] = field(default_factory=list)
     records: list[tuple[float, ...]] = field(default_factory=list)
-    metres: float = 0.0
-    bumps: list[Array] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.map, self.position = new_map(self.building), self.building.entrance
-        self.way.append(self.position)
 
     def scan(self) -> None:
-        cloud = self.building.scan(self.building.pose(self.position), len(self.records))
-        self.map.update(cloud)
-        self.scanned_at.append(self.position)
+        place = self.way[-1]
+        self.map.update(self.building.scan(self.building.pose(place), len(self.records)))
+        self.scanned_at.append(place)
         self.records.append((self.metres, *self.truth.judge(self.map)))
 
+    def drive(self, way: Array) -> None:
+        """Drive along a way to its end, or to where something stands that the map did not know of."""
+        for place in way[1:]:
+            if not self.building.is_free(np.linspace(self.way[-1], place, 5), RADIUS).all():
+                self.touched.append(place)
+                return
+            self.metres += float(np.linalg.norm(place - self.way[-1]))
+            self.way.append(place)
+
     def roads(self) -> Roads:
-        """Return the ways that the map knows to be free, from cell to cell of a grid and its eight neighbours."""
+        """Return the shortest ways over cells that the map knows to be free, to their eight neighbours."""
         grid = occupancy_grid(self.map, (0, 0), self.building.size[:2], heights=HEIGHTS, resolution=CELL)
-        for x, y in self.bumps:
+        for x, y in self.touched:
             grid.data[int(y / CELL), int(x / CELL)] = 100
-        room = ndimage.distance_transform_edt(grid.data < 50) * CELL  # to the next obstacle
-        rows, columns = np.indices(grid.data.shape)
-        centres = grid.origin + CELL * (np.stack([columns, rows], axis=-1) + 0.5)
-        here = np.hypot(*(centres - self.position).transpose(2, 0, 1))
-        free = ((grid.data >= 0) & (room > CLEARANCE)) | (here < CLEARANCE)
+        row, column = np.indices(grid.data.shape)
+        centres = grid.origin + CELL * (np.stack([column, row], axis=-1) + 0.5)
+        from_robot = np.linalg.norm(centres - self.way[-1], axis=-1)
+        from_obstacle = CELL * ndimage.distance_transform_edt(grid.data < 50)
+        free = ((grid.data >= 0) & (from_obstacle > CLEARANCE)) | (from_robot < CLEARANCE)
         number = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-        edges = [_neighbours(number, step) for step in ((0, 1), (1, 0), (1, 1), (1, -1))]
-        a, b, length = (np.concatenate(part) for part in zip(*edges))
+        a, b, length = (np.concatenate(part) for part in zip(*map(_edges, [number] * 4, _STEPS)))
         n = np.count_nonzero(free)
         graph = coo_array((length, (a, b)), (n, n)).tocsr()
-        metres, before = dijkstra(graph, False, number.flat[here.argmin()], return_predecessors=True)
+        metres, before = dijkstra(graph, False, number.flat[from_robot.argmin()], return_predecessors=True)
         return Roads(centres[free], metres, before)
 
-    def drive(self, way: Array, scans: int) -> None:
-        """Drive along a way until it ends, or something is in the way, with at most so many scans."""
-        since = 0.0
-        for place in way[1:]:
-            if not self.building.is_free(np.linspace(self.position, place, 5), RADIUS).all():
-                self.bumps.append(place)
-                break
-            step = float(np.hypot(*(place - self.position)))
-            self.metres, since, self.position = self.metres + step, since + step, place
-            self.way.append(place)
-            if since >= SCAN_EVERY:
-                self.scan()
-                since, scans = 0.0, scans - 1
-            if not scans:
-                return
-        self.scan()
+
+_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
-def _neighbours(number: NDArray[np.int64], step: tuple[int, int]) -> tuple[Array, Array, Array]:
-    """Return the numbers of cells and of their neighbours one step away, where both have one, and the lengths."""
+def _edges(number: NDArray[np.int64], step: tuple[int, int]) -> tuple[Indices, Indices, Array]:
+    """Return the numbers of cells and of their neighbours a step away, where both have one (-1 is none), in metres."""
+    down, right = step
     rows, columns = number.shape
-    dy, dx = step
-    a = number[: rows - dy, max(0, -dx) : columns - max(0, dx)].ravel()
-    b = number[dy:, max(0, dx) : columns + min(0, dx)].ravel()
+    a = number[: rows - down, max(0, -right) : columns - max(0, right)].ravel()
+    b = number[down:, max(0, right) : columns - max(0, -right)].ravel()
     both = (a >= 0) & (b >= 0)
-    return a[both], b[both], np.full(np.count_nonzero(both), CELL * np.hypot(dx, dy))
+    return a[both], b[both], np.full(np.count_nonzero(both), CELL * np.hypot(down, right))
 
 
-def by_information(robot: Robot, roads: Roads, candidates: NDArray[np.intp]) -> int:
-    """Return the place whose scan is expected to tell most for each metre of way, the scan itself as one metre."""
-    drawn = robot.rng.permutation(candidates)[:VIEWS]
-    poses = np.stack([robot.building.pose(place) for place in roads.cells[drawn]])
+def by_information(robot: Robot, roads: Roads, candidates: Indices) -> int:
+    """Return where a scan is expected to tell most, beyond what another one from here would, for a metre of way.
+
+    The scan itself counts as a metre, so that near places do not always win.
+    """
+    candidates = robot.rng.permutation(candidates)
+    _, one_a_square = np.unique(roads.cells[candidates] // SQUARE, axis=0, return_index=True)
+    drawn = candidates[one_a_square]
+    poses = [robot.building.pose(place) for place in (*roads.cells[drawn], robot.way[-1])]
     lidar = robot.building.lidar
-    rays = replace(lidar, beams=8, columns=36).rays.reshape(-1, 3)
-    gain = information_gain(robot.map, poses, rays, max_range=lidar.reach, spacing=CELL)
-    return int(drawn[np.argmax(gain.total / (1 + roads.metres[drawn]))])
+    rays = replace(lidar, **RAYS).rays.reshape(-1, 3)
+    gain = information_gain(robot.map, np.stack(poses), rays, max_range=lidar.reach, spacing=CELL).total
+    return int(drawn[np.argmax((gain[:-1] - gain[-1]) / (1 + roads.metres[drawn]))])
 
 
-def by_frontier(robot: Robot, roads: Roads, candidates: NDArray[np.intp]) -> int:
-    """Return the place, within a metre of a frontier, that is the shortest way off."""
+def by_frontier(robot: Robot, roads: Roads, candidates: Indices) -> int:
+    """Return the place with the shortest way of those from which a frontier is near."""
     low, high = (0, 0, HEIGHTS[0]), (*robot.building.size[:2], HEIGHTS[1])
     found = frontiers(robot.map, low, high, resolution=CELL)
-    large = found.points[found.sizes[found.cluster] >= 8, :2]
-    if not len(large):
-        return by_chance(robot, roads, candidates)
-    from_frontier = np.hypot(*(roads.cells[candidates, None] - large).transpose(2, 0, 1)).min(axis=1)
-    order = roads.metres[candidates] + 100 * np.maximum(from_frontier - 1, 0)
-    return int(candidates[np.argmin(order)])
+    points = found.points[found.sizes[found.cluster] >= FRONTIER_CELLS, :2]
+    near = np.empty(0, dtype=np.intp)
+    if len(points):
+        near = candidates[cKDTree(points).query(roads.cells[candidates])[0] < FRONTIER_IN_VIEW]
+    return int(near[np.argmin(roads.metres[near])]) if len(near) else by_chance(robot, roads, candidates)
 
 
-def by_chance(robot: Robot, roads: Roads, candidates: NDArray[np.intp]) -> int:
+def by_chance(robot: Robot, roads: Roads, candidates: Indices) -> int:
     """Return any place."""
     return int(robot.rng.choice(candidates))
 
 
-CHOOSE: dict[str, Callable[[Robot, Roads, NDArray[np.intp]], int]] = dict(
-    zip(STRATEGIES, (by_information, by_frontier, by_chance))
-)
+STRATEGIES: dict[str, tuple[Callable[[Robot, Roads, Indices], int], str]] = {
+    "information per metre": (by_information, "#c4161c"),
+    "nearest frontier": (by_frontier, "#2a5db0"),
+    "random goals": (by_chance, "#7a7a74"),
+}
 
 
 def explore(building: SyntheticBuilding, truth: Truth, strategy: str, scans: int) -> Robot:
-    """Return the robot after so many scans."""
-    robot = Robot(building, truth, np.random.default_rng(building.seed))
+    """Return the robot after so many scans, or when there is no new place to scan from."""
+    robot = Robot(
+        building, truth, new_map(building), np.random.default_rng(building.seed), way=[building.entrance]
+    )
     robot.scan()
     while len(robot.records) < scans:
         roads = robot.roads()
-        from_scans = np.hypot(*(roads.cells[:, None] - np.array(robot.scanned_at)).transpose(2, 0, 1)).min(axis=1)
-        candidates = np.flatnonzero(np.isfinite(roads.metres) & (from_scans > 0.5))
-        goal = CHOOSE[strategy](robot, roads, candidates)
-        robot.drive(roads.way_to(goal), scans - len(robot.records))
+        new = cKDTree(np.array(robot.scanned_at)).query(roads.cells)[0] > NEW_PLACE
+        candidates = np.flatnonzero(np.isfinite(roads.metres) & new)
+        if not len(candidates):
+            break
+        robot.drive(roads.way_to(STRATEGIES[strategy][0](robot, roads, candidates)))
+        robot.scan()
     return robot
+
+
+def curves(axes: Axes, runs: dict[str, list[Robot]], x: int | None, y: int, title: str, unit: str) -> None:
+    """Draw a column of the records over another one, or over the number of scans."""
+    furthest = 0.0
+    for strategy, (_, colour) in STRATEGIES.items():
+        records = [np.array(robot.records) for robot in runs[strategy]]
+        over = [np.arange(1.0, len(r) + 1) if x is None else r[:, x] for r in records]
+        for xs, r in zip(over, records):
+            axes.plot(xs, r[:, y], color=colour, linewidth=0.8, alpha=0.5 if len(records) > 1 else 0)
+        common = np.linspace(min(xs[0] for xs in over), min(xs[-1] for xs in over), 200)
+        mean = np.mean([np.interp(common, xs, r[:, y]) for xs, r in zip(over, records)], axis=0)
+        axes.plot(common, mean, color=colour, linewidth=2.6, label=strategy)
+        furthest = max(furthest, common[-1] if strategy != "random goals" else 0)
+    axes.set(title=title, xlabel="scans" if x is None else "metres driven", ylabel=unit, xlim=(0, furthest))
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def floor_plan(axes: Axes, robot: Robot, strategy: str) -> None:
+    """Draw what the robot has mapped, seen from above, and its way."""
+    size = robot.building.size
+    grid = occupancy_grid(robot.map, (0, 0), size[:2], heights=(0.3, 1.9), resolution=0.1)
+    image = np.full((*grid.data.shape, 3), 250, dtype=np.uint8)
+    labelled = grid.label != MISSING
+    image[(grid.data < 0) | ((grid.data >= 50) & ~labelled)] = 205
+    image[labelled] = robot.map.classes.palette[grid.label[labelled]]
+    axes.imshow(image, origin="lower", extent=(0, size[0], 0, size[1]), interpolation="nearest")
+    for room in robot.building.plan.rooms:
+        (x, right), (y, top) = room.x, room.y
+        axes.add_patch(Rectangle((x, y), right - x, top - y, fill=False, color="black", linewidth=0.5, alpha=0.5))
+    colour = STRATEGIES[strategy][1]
+    way, scans = np.array(robot.way).T, np.array(robot.scanned_at).T
+    axes.plot(*way, color="white", linewidth=3.2)
+    axes.plot(*way, color=colour, linewidth=1.6)
+    axes.plot(*scans, "o", color=colour, markersize=4.5, markeredgecolor="white", markeredgewidth=0.8)
+    axes.plot(*way[:, 0], "*", color=colour, markersize=17, markeredgecolor="white")
+    axes.plot(*way[:, -1], "o", color="white", markersize=10, markeredgecolor=colour, markeredgewidth=2.5)
+    metres, surfaces, *_ = robot.records[-1]
+    axes.set_title(f"{strategy}: {surfaces:.0%} known after {metres:.0f} m", color=colour)
+    axes.set(xticks=(), yticks=())
+
+
+def draw(runs: dict[str, list[Robot]], out: Path) -> None:
+    figure = Figure(figsize=(15, 9.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    top = [figure.add_subplot(2, 3, i + 1) for i in range(3)]
+    curves(top[0], runs, 0, 1, "surfaces known", "share")
+    curves(top[1], runs, None, 1, "surfaces known", "share")
+    curves(top[2], runs, 0, 4, "entropy of free or occupied", "nats, mean over the building")
+    top[1].legend(loc="lower right", framealpha=0.9)
+    for axes in top[:2]:
+        axes.set_ylim(0, 1)
+    for i, (strategy, robots) in enumerate(runs.items()):
+        floor_plan(figure.add_subplot(2, 3, 4 + i), robots[0], strategy)
+    classes = runs["random goals"][0].map.classes
+    handles = [
+        Patch(color=np.array(colour) / 255, label=name) for name, colour in zip(classes.names, classes.colours)
+    ]
+    handles = [handle for handle in handles if handle.get_label() not in ("floor", "ceiling")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    figure.savefig(out, dpi=110)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("explore.png"))
-    parser.add_argument("--steps", type=int, default=36, help="scans of each robot")
-    parser.add_argument("--seeds", type=int, default=1, help="buildings")
+    parser.add_argument("--steps", type=int, default=28, help="scans of each robot")
+    parser.add_argument("--seeds", type=int, default=1, help="number of buildings")
     args = parser.parse_args()
+
     runs: dict[str, list[Robot]] = {strategy: [] for strategy in STRATEGIES}
+    print(
+        f"{'building':>8}  {'strategy':22} {'scans':>5} {'metres':>6} {'surfaces':>8} {'floor':>6} {'right':>6} "
+        f"{'entropy':>8} {'touched':>7}"
+    )
     for seed in range(args.seeds):
         building = SyntheticBuilding(seed)
         truth = Truth(building)
-        for strategy in STRATEGIES:
-            start = time.time()
+        for strategy, robots in runs.items():
             robot = explore(building, truth, strategy, args.steps)
-            runs[strategy].append(robot)
-            metres, floor, surfaces, right, entropy = robot.records[-1]
-            print(
-                f"building {seed}, {strategy:22} {metres:5.1f} m: floor {floor:.0%}, surfaces {surfaces:.0%}, "
-                f"labels right {right:.1%}, entropy {entropy:.3f} nats, bumps {len(robot.bumps)} ({time.time() - start:.0f} s)",
-                flush=True,
-            )
-    import pickle; pickle.dump({k:[(np.array(r.records),np.array(r.way),np.array(r.scanned_at)) for r in v] for k,v in runs.items()},open("/tmp/explore_task/runs.pkl","wb"))
+            robots.append(robot)
+            for i in (len(robot.records) // 2, len(robot.records)):
+                metres, surfaces, floor, right, entropy = robot.records[i - 1]
+                print(
+                    f"{seed:8}  {strategy:22} {i:5} {metres:6.1f} {surfaces:8.1%} {floor:6.1%} {right:6.1%} "
+                    f"{entropy:8.3f} {len(robot.touched):7}"
+                )
+    draw(runs, args.out)
+    print(args.out)
 
 
 if __name__ == "__main__":

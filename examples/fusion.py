@@ -84,13 +84,8 @@ def main(out: Path) -> None:
     corners = np.array([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])])
     seen_by_b = (corners - T_a_b[:3, 3]) @ T_a_b[:3, :3]
     drawn(axes[0, 0], a, low, high, f"robot a: {len(west)} scans, {len(a):,} sites")
-    drawn(
-        axes[0, 1],
-        b,
-        seen_by_b.min(axis=0)[:2],
-        seen_by_b.max(axis=0)[:2],
-        f"robot b, in its own frame: {len(east)} scans",
-    )
+    b_low, b_high = seen_by_b.min(axis=0)[:2], seen_by_b.max(axis=0)[:2]
+    drawn(axes[0, 1], b, b_low, b_high, f"robot b, in its own frame: {len(east)} scans, {len(b):,} sites")
     both = drawn(axes[1, 0], joined, low, high, f"joined: {len(joined):,} sites")
     all_of_it = drawn(axes[1, 1], single, low, high, f"one map of all scans: {len(single):,} sites")
     palette = building.classes.palette / 255
@@ -107,7 +102,7 @@ def main(out: Path) -> None:
     exact = np.abs(straight.query(X).probability - single.query(X).probability).max()
     print(f"one frame: joined and single map differ by {exact:.1g} at most")
     print(
-        f"two frames: {same.mean():.3f} of the slice has the same state, probabilities differ by {apart.mean():.3f} on average"
+        f"two frames: {same.mean():.3f} of the slice has the same state, probabilities differ by {apart.mean():.3f}"
     )
     print(f"picture in {out}")
 

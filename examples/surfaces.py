@@ -1,14 +1,15 @@
-"""The surfaces of a map as triangle meshes, at any resolution and for any class, from the same few scans of a room.
+"""The surfaces of a map as triangle meshes, at any resolution and for any class, from scans of one room.
 
     uv run examples/surfaces.py --out surfaces.png
 
 A depth camera goes once around a furnished room: noisy points, one in nine with a label, some of those wrong, and
-one lamp that no view labels. The map is asked on two lattices: its voxels have no say in how fine a mesh is.
+one lamp that no view labels. The mesh is as fine as the lattice on which the map is asked; the map stays the same.
 
-Above: the surface on which something is there with probability 1/2, in the colours of the most probable classes, seen
-through the near wall and without the ceiling. Below: how little the map knows of the class that it shows, which gives
-away the lamp without labels; and one class alone, the surface on which a chair is there with probability 1/2. The
-finer mesh of the room is written beside the picture, as a PLY file with labels and uncertainty at its vertices.
+Above: the surface on which something is there with probability 0.7, in the colours of the most probable classes,
+seen through the near walls and without the ceiling. Below: how unsure the map is of the class that it shows, most
+of all of the lamp without labels, and where furniture hid the floor; and one class alone, the surface on which a
+chair is there with probability 0.7. The finer mesh of the room is written beside the picture, as a PLY file with
+labels and uncertainty at its vertices.
 """
 
 import argparse
@@ -25,8 +26,9 @@ from semgp.scene import DepthCamera
 from semgp.surfaces import Mesh, surface, write_mesh
 
 LOW, HIGH = (-3.0, -2.5, -0.5), (3.0, 2.5, 2.45)  # metres: the room without its ceiling
+LEVEL = 0.7  # probability on the surfaces; where it is 1/2 is a third of a voxel further out
 LAMP = np.array([-0.5, -0.3, 0.8])  # direction to the light
-SIZE = (1000, 720)  # pixels of each picture
+SIZE = (1000, 640)  # pixels of each picture
 
 
 def drawn(mesh: Mesh, colours: NDArray[np.uint8], view: View, spacing: float) -> NDArray[np.uint8]:
@@ -66,10 +68,11 @@ def main() -> None:
     for scan in scans:
         room_map.update(scan.observed)
 
-    coarse, fine = (surface(room_map, resolution=spacing, low=LOW, high=HIGH) for spacing in (0.1, 0.04))
+    coarse = surface(room_map, resolution=0.1, level=LEVEL, low=LOW, high=HIGH)
+    fine = surface(room_map, resolution=0.04, level=LEVEL, low=LOW, high=HIGH)
     of_chairs = fine.vertices[fine.label == room.classes.index("chair")]
-    low, high = np.quantile(of_chairs, (0.01, 0.99), axis=0) + ((-0.15,), (0.15,))
-    chairs = surface(room_map, "chair", resolution=0.02, low=low, high=high)
+    low, high = np.quantile(of_chairs, (0.01, 0.99), axis=0)
+    chairs = surface(room_map, "chair", resolution=0.02, level=LEVEL, low=low - 0.15, high=high + 0.15)
 
     truth = LabelledCloud(
         np.vstack([scan.truth.points for scan in scans]),
@@ -81,8 +84,8 @@ def main() -> None:
     write_mesh(out.with_suffix(".ply"), fine)
 
     width, height = SIZE
-    whole = View.look_at((-0.9, -5.9, 5.6), (-0.05, 0.0, 0.75), fov=40, width=width, height=height)
-    close = View.look_at((-1.9, -3.4, 2.6), chairs.vertices.mean(axis=0), fov=33, width=width, height=height)
+    whole = View.look_at((-0.7, -6.1, 5.9), (0.15, 0.0, 0.7), fov=37, width=width, height=height)
+    close = View.look_at((-1.9, -3.4, 2.6), chairs.vertices.mean(axis=0), fov=29, width=width, height=height)
     assert fine.variance is not None
     deviation = np.sqrt(fine.variance)
     least, most = np.quantile(deviation, (0.01, 0.99))

@@ -106,9 +106,9 @@ def naive(predictions: list[Prediction], prior: Array, v_0: Array | None) -> tup
             elif p.observed[m]:
                 q = p.probability[m]
                 weights[k, m] = sum(q[c] * math.log(q[c] / prior[c]) for c in range(C) if q[c] > 0)
-        total = weights[:, m].sum()
-        if total > 0:
-            weights[:, m] /= total
+        if weights[:, m].sum() == 0:
+            weights[:, m] = [p.observed[m] for p in predictions]
+        weights[:, m] /= weights[:, m].sum() or 1
         for c in range(C):
             rows[m, c] = prior[c] ** (1 - weights[:, m].sum())
             for k, p in enumerate(predictions):
@@ -118,7 +118,7 @@ def naive(predictions: list[Prediction], prior: Array, v_0: Array | None) -> tup
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.booleans())
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=100)
 def test_robust_weights(seed: int, K: int, with_variances: bool) -> None:
     rng = np.random.default_rng(seed)
     M, C = 12, int(rng.integers(1, 5))
@@ -144,7 +144,7 @@ class TestFusePredictions:
     @pytest.mark.parametrize("weights", ["robust", "one"])
     @pytest.mark.parametrize("prior_variance", [None, 1.0])
     def test_one_answer_alone_stays_as_it_is(self, weights: Weights, prior_variance: float | None) -> None:
-        alone = prediction([[0.7, 0.2, 0.1], [0.2, 0.2, 0.6]], variance=[[0.3], [0.9]])
+        alone = prediction([[0.7, 0.2, 0.1], [0.2, 0.2, 0.6]], variance=[[0.3], [1.0]])
         silent = prediction([[0.1, 0.1, 0.8]] * 2, observed=False, variance=0.01)
         for answers in ([alone], [alone, silent], [silent, alone, silent]):
             fused = fuse_predictions(answers, prior=[1, 2, 3], prior_variance=prior_variance, weights=weights)

@@ -17,6 +17,8 @@ from semgp.errors import FileFormatError, InputError
 from semgp.gp.model import GPModel
 from semgp.gp.stationary import Matern52
 from semgp.maps.files import load_map, save_map
+from semgp.maps.forgetting import Forgetting
+from semgp.maps.free_space import FreeSpace
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.kinds import MAP_KINDS
 from semgp.maps.protocol import SemanticMap
@@ -29,6 +31,10 @@ MAKERS: dict[str, Callable[[Classes], SemanticMap]] = {
     "gp, dirichlet": lambda classes: GPSemanticMap(classes, BlockModel(resolution=0.02, posterior="dirichlet")),
     "gp, softmax": lambda classes: GPSemanticMap(
         classes, BlockModel(Matern52((0.4,), 3.0), resolution=0.02, posterior="softmax", leaf=32)
+    ),
+    "gp, free space": lambda classes: GPSemanticMap(classes, BlockModel(resolution=0.02), free=FreeSpace()),
+    "gp, forgetting": lambda classes: GPSemanticMap(
+        classes, BlockModel(resolution=0.02), free=FreeSpace(), forgetting=Forgetting(1e9, passed=1.0)
     ),
     "octomap": lambda classes: SemanticOctoMap(classes, resolution=0.2),
     "knn": KNNMap,
@@ -153,7 +159,9 @@ class TestBadInput:
         for semantic_map in (make(corner.classes), built(make, corner[:0])):
             with pytest.raises(InputError, match="no label"):
                 semantic_map.query(corner.points)
-        if make is not MAKERS["octomap"]:  # its voxels need no labels
+        if make in (MAKERS["gp, free space"], MAKERS["gp, forgetting"]):  # rays need no labels
+            assert (built(make, unlabelled).query(corner.points).label == MISSING).all()
+        else:
             with pytest.raises(InputError, match="no label"):
                 built(make, unlabelled).query(corner.points)
 

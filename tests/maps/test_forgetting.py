@@ -166,13 +166,14 @@ class TestSites:
         np.testing.assert_array_equal(sites.spread[:, 3], spread[:, 3])
         np.testing.assert_allclose((sites.mass / now[:, None])[heavy], share[heavy], atol=2e-3)
 
-    @pytest.mark.xfail(reason="of the last class that is more probable than what is left of another", strict=True)
+    @pytest.mark.xfail(reason="it is one of the last class that outweighs what is left of the others", strict=True)
     def test_a_trace_stays_of_the_most_probable_class(self) -> None:
         sites = self.made()
         top = sites.mass.argmax(axis=1)
         sites.clock = 200.0
         sites.fade(np.arange(len(sites.cells)), 1.0)
-        np.testing.assert_array_equal(sites.mass, np.eye(3, dtype=int)[top])
+        assert (sites.mass.max(axis=1) == 1).all()
+        assert (sites.mass[np.arange(len(sites)), top] == 1).all()
 
     def test_a_trace_stays_in_its_place(self) -> None:
         sites = self.made()
@@ -475,7 +476,8 @@ class TestLongLife:
         elsewhere = replace(elsewhere, T_world_sensor=scan(sensor=off(SENSOR, 20, 0, 0)).T_world_sensor)
         updated(made, *[gone, elsewhere] * 9)
         assert made.positions.shape == (0, 3)
-        assert (made.occupancy(TestGone().on(TestGone.WALL_AT)).state == OCCUPIED).all()
+        x = made.occupied_positions[:, 0] - TestGone.WALL_AT[0]
+        assert np.minimum(np.abs(x), np.abs(x - 20)).max() < 1e-6
 
     @pytest.mark.parametrize("after", [1, 4, 8])
     @pytest.mark.parametrize("per", ["scan", "second"])

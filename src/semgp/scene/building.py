@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import cos, sin
 from numbers import Integral
@@ -17,7 +17,7 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.scene.floorplan import BUILDING_CLASSES, HEIGHT, LENGTH, MISTAKEN_FOR, WIDTH, FloorPlan, floor_plan
 from semgp.scene.lidar import Lidar, PatchFaults
-from semgp.scene.raycast import BOX, Solids
+from semgp.scene.raycast import BOX, Solids, cast
 from semgp.voxels import voxel_keys
 
 ROBOT_HEIGHT, MAST = 1.1, 1.0
@@ -123,9 +123,7 @@ class SyntheticBuilding:
         if not np.allclose(T[2, :3], (0, 0, 1), atol=1e-6):
             raise InputError("the lidar must stand upright: T_world_sensor may turn about the vertical only.")
         if not (0 < T[2, 3] < HEIGHT and self.is_free(T[None, :2, 3], 0.0)[0]):
-            raise InputError(
-                f"the lidar cannot stand at {T[:3, 3]} m: the place is taken, or not in the building."
-            )
+            raise InputError(f"the lidar cannot stand at {T[:3, 3]} m: something does, or it is not inside.")
         if not isinstance(number, Integral) or number < 0:
             raise InputError(f"a scan's number is whole and not negative, not {number!r}.")
         points, solid = self.lidar.measure(self._solids, T, np.random.default_rng((int(self.seed), int(number))))
@@ -159,19 +157,29 @@ class SyntheticBuilding:
         """Return the places of a grid, (N, 2), that a robot of a radius can get to from the entrance, metres.
 
         Ways lead from each place of the grid to its four neighbours.
+
+        Raises
+        ------
+        InputError
+            A spacing that is not positive, or a robot that does not fit where it begins.
         """
+        if not 0 < spacing < np.inf:
+            raise InputError(f"the spacing of a grid must be above zero, but is {spacing}.")
         axes = [np.arange(spacing / 2, size, spacing) for size in self.size[:2]]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         free = self.is_free(grid.reshape(-1, 2), radius).reshape(grid.shape[:2])
         part, _ = ndimage.label(free)
         i, j = (self.entrance / spacing).astype(int)
-        return np.asarray(grid[free & (part == part[i, j])])
+        if not free[i, j]:
+            raise InputError(
+                f"a robot of a radius of {radius} m does not fit at the entrance: take a smaller one."
+            )
+        return np.asarray(grid[part == part[i, j]])
 
     def surfaces(self, radius: float, resolution: float = 0.1) -> LabelledCloud:
-        """Return the surfaces that the lidar sees from where the robot can get to, with their true labels.
+        """Return the surfaces that the lidar sees from where a robot can get to, with their true labels.
 
-        The robot scans without noise and faults from a grid of places 1.5 m apart; of the points in each voxel,
-        one stays.
+        Its rays go out, without noise, from a grid of places 1.5 m apart; of the points in each voxel, one stays.
 
         Parameters
         ----------
@@ -179,14 +187,22 @@ class SyntheticBuilding:
             The robot's, in metres.
         resolution : float, optional
             Edge of a voxel in metres.
+
+        Raises
+        ------
+        InputError
+            A robot that does not fit where it begins, or a resolution too fine.
         """
-        ideal = SyntheticBuilding(self.seed, replace(self.lidar, noise=0.0), PatchFaults(wrong=0.0))
         places = self.reachable(radius)
-        _, one_each = np.unique(np.floor(places / _SURVEY_STEP), axis=0, return_index=True)
-        scans = [ideal.scan(self.pose(place)) for place in places[one_each]]
-        points, labels = np.vstack([scan.points for scan in scans]), np.concatenate([s.hard_labels for s in scans])
+        _, one_each = np.unique(places // _SURVEY_STEP, axis=0, return_index=True)
+        rays = self.lidar.rays.reshape(-1, 3)
+        origins = np.insert(np.repeat(places[one_each], len(rays), axis=0), 2, MAST, axis=1)
+        rays = np.tile(rays, (len(one_each), 1))
+        hits = cast(self._solids, origins, rays)
+        met = hits.distance <= self.lidar.reach
+        points = origins[met] + hits.distance[met, None] * rays[met]
         _, first = np.unique(voxel_keys(points, resolution), return_index=True)
-        return LabelledCloud(points[first], BUILDING_CLASSES, labels[first])
+        return LabelledCloud(points[first], BUILDING_CLASSES, self._labels[hits.solid[met][first]])
 
     @cached_property
     def _solids(self) -> Solids:
@@ -224,7 +240,7 @@ def _near(solids: Solids, points: NDArray[np.float64], radius: float) -> NDArray
 
 
 def _touched(points: NDArray[np.float64], radius: float, solids: Solids, i: int) -> NDArray[np.intp]:
-    """Return which points (N, 2) are within a radius of solid i, seen from above; an ellipsoid counts as a disc."""
+    """Return which points (N, 2) are within a radius of solid i, seen from above, ellipsoids as discs."""
     half = solids.half[i, :2]
     near = np.flatnonzero((np.abs(points - solids.centre[i, :2]) <= radius + np.hypot(*half)).all(axis=1))
     x, y = (points[near] - solids.centre[i, :2]).T
