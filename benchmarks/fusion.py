@@ -1,6 +1,6 @@
 """Maps of two halves of a SemanticKITTI sequence, fused, or asked as a committee, against the map of all scans.
 
-    uv run benchmarks/fusion.py DATA/semantickitti_08
+    uv run benchmarks/map_fusion.py DATA/semantickitti_08
 
 The halves a and b are every other scan, or the first and the second half. "turned" is a frame of its own, turned by
 30 degrees about the vertical and shifted by some metres, in which b is built before it is fused or joins the

@@ -42,22 +42,17 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 RADIUS, CLEARANCE = 0.2, 0.3  # metres: the robot's own, and the one it plans with
-CELL, HEIGHTS = (
-    0.2,
-    (0.15, 1.15),
-)  # metres: the grid it plans on, and between which heights it could touch something
-NEW_PLACE = 0.5  # metres from all earlier scans
-SQUARE, RAYS = 1.5, {"beams": 8, "columns": 24}  # one view a square is rated, by so many rays
-FRONTIER_CELLS, FRONTIER_IN_VIEW = (
-    8,
-    1.0,
-)  # size of a frontier worth a visit, and metres to it from where it is seen
+CELL, HEIGHTS = 0.2, (0.15, 1.15)  # metres: the grid it plans on, and between which heights it could touch something
+NEW_PLACE = 1.0  # metres from all earlier scans
+SQUARE, RAYS = 1.5, {"beams": 8, "columns": 24}  # one view a square of so many metres is rated, by so many rays
+LEVEL = 0.8, 1.2  # metres: frontiers are looked for about the height of the lidar
+FRONTIER, AT_FRONTIER = 8, 0.5  # cells of a frontier that is worth a visit, and how near one gets, in metres
 
 
 def new_map(building: SyntheticBuilding) -> SpatialMap:
     """Return an empty map. Others that keep free space do as well, such as SemanticOctoMap(building.classes, 0.1)."""
     model = replace(GENERAL, resolution=0.1)
-    return GPSemanticMap(building.classes, model, tolerance=0.2, free=FreeSpace(rays=2048))
+    return GPSemanticMap(building.classes, model, tolerance=0.2, free=FreeSpace())
 
 
 class Truth:
@@ -179,12 +174,12 @@ def by_information(robot: Robot, roads: Roads, candidates: Indices) -> int:
 
 def by_frontier(robot: Robot, roads: Roads, candidates: Indices) -> int:
     """Return the place with the shortest way of those from which a frontier is near."""
-    low, high = (0, 0, HEIGHTS[0]), (*robot.building.size[:2], HEIGHTS[1])
+    low, high = (0, 0, LEVEL[0]), (*robot.building.size[:2], LEVEL[1])
     found = frontiers(robot.map, low, high, resolution=CELL)
-    points = found.points[found.sizes[found.cluster] >= FRONTIER_CELLS, :2]
+    points = found.points[found.sizes[found.cluster] >= FRONTIER, :2]
     near = np.empty(0, dtype=np.intp)
     if len(points):
-        near = candidates[cKDTree(points).query(roads.cells[candidates])[0] < FRONTIER_IN_VIEW]
+        near = candidates[cKDTree(points).query(roads.cells[candidates])[0] < AT_FRONTIER]
     return int(near[np.argmin(roads.metres[near])]) if len(near) else by_chance(robot, roads, candidates)
 
 

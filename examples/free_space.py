@@ -27,6 +27,7 @@ from semgp.prediction import UNKNOWN, OccupancyPrediction
 from semgp.scene.building import SyntheticBuilding
 
 Array = NDArray[np.float64]
+Extent = tuple[float, float, float, float]
 
 HEIGHT, STEP, RESOLUTION = 0.65, 0.03, 0.1
 BLUE, RED, GREY = np.array([0.23, 0.44, 0.72]), np.array([0.76, 0.15, 0.12]), np.array([0.82, 0.82, 0.8])
@@ -40,7 +41,7 @@ def blended(occupancy: OccupancyPrediction, shape: tuple[int, int]) -> Array:
     return np.asarray(colour.reshape(*shape, 3))
 
 
-def panel(axes: Axes, picture: Array, extent: tuple[float, float, float, float], places: Array, title: str) -> None:
+def panel(axes: Axes, picture: Array, extent: Extent, places: Array, title: str) -> None:
     axes.imshow(picture, origin="lower", extent=extent, interpolation="nearest")
     axes.plot(*places.T, "k^", markersize=5, markerfacecolor="white")
     axes.set(title=title, xticks=[], yticks=[])
@@ -78,7 +79,8 @@ def main(out: Path) -> None:
         axes[1, 0], blended(answer.occupancy, shape), extent, places, "GP map: probability that something is there"
     )
     panel(axes[1, 1], classes.reshape(*shape, 3), extent, places, "GP map: class of what is there")
-    keys = [Patch(color=tuple(c.tolist()), label=t) for c, t in ((RED, "occupied"), (BLUE, "free"), (GREY, "unknown"))]
+    states = ((RED, "occupied"), (BLUE, "free"), (GREY, "unknown"))
+    keys = [Patch(color=tuple(colour.tolist()), label=state) for colour, state in states]
     seen = np.unique(answer.label[answer.occupancy.state > 0])
     keys += [Patch(color=palette[c], label=building.classes.names[c]) for c in seen if c >= 0]
     figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), frameon=False)

@@ -101,9 +101,7 @@ def main(out: Path) -> None:
     X = single.positions[:5000]
     exact = np.abs(straight.query(X).probability - single.query(X).probability).max()
     print(f"one frame: joined and single map differ by {exact:.1g} at most")
-    print(
-        f"two frames: {same.mean():.3f} of the slice has the same state, probabilities differ by {apart.mean():.3f}"
-    )
+    print(f"two frames: {same.mean():.3f} of the slice in the same state, mean difference {apart.mean():.3f}")
     print(f"picture in {out}")
 
 

@@ -70,7 +70,7 @@ def test_slice(built: Path, tmp_path: Path) -> None:
         ("is no 4 x 4 matrix", ("fuse", "{built}", "{built}", "--transform", "{scan}", "--out", "{out}")),
         ("cannot be read", ("fuse", "{built}", "{built}", "--transform", "{out}.txt", "--out", "{out}")),
         ("only GP maps", ("fuse", "{built}", "{knn}", "--out", "{out}")),
-        ("cannot be read", ("slice", "{built}", "--heights", "0", "1", "--costs", "{out}.json", "--out", "{out}.y")),
+        ("cannot be read", ("slice", "{built}", "--heights", "0", "1", "--costs", "{out}.txt", "--out", "{out}")),
     ],
 )  # fmt: skip
 def test_bad_input(

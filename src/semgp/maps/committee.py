@@ -14,6 +14,7 @@ from semgp.classes import Classes
 from semgp.errors import InputError
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.protocol import SemanticMap, query_points
+from semgp.parallel import parallel_map, slices
 from semgp.prediction import OccupancyPrediction, Prediction
 
 Array = NDArray[np.float64]
@@ -23,6 +24,7 @@ Weights = Literal["robust", "one"]
 FLOOR = 1e-12
 """Probabilities below count as this, variances below this share of the prior's as that: nobody is certain."""
 
+_CHUNK = 4_096  # points that one thread combines at a time
 _FAR = 1e5  # metres from all data: there a map answers with its prior
 
 
@@ -140,22 +142,27 @@ def fuse_predictions(
     K, C = len(predictions), len(classes)
     p_0 = _positive("prior", 1.0 if prior is None else prior, (C,))
     p_0 = p_0 / p_0.sum()
-    v_0 = None if prior_variance is None else _positive("prior_variance", prior_variance, (K, C))
-    v = [] if v_0 is None else _variances(predictions, v_0)
-    answers = [np.maximum(p.probability, FLOOR) for p in predictions]
-    learned = [np.log(s / u).mean(axis=1) / 2 for s, u in zip(v_0, v)] if v_0 is not None and v else None
     observed = np.stack([p.observed for p in predictions])
-    b = _weights(answers, p_0, observed, weights, learned)
-    variance = None
-    if v_0 is not None and v and np.allclose(v_0, v_0[0], rtol=1e-6, atol=0):
-        variance = 1 / (1 / v_0[0] + sum(b[k][:, None] * (1 / v[k] - 1 / v_0[0]) for k in range(K)))
-    return Prediction(
-        classes,
-        _pooled(answers, p_0, b),
-        np.logical_or.reduce(observed),
-        variance=variance,
-        occupancy=_fused_occupancy(predictions, prior_occupancy, weights),
-    )
+    variances = [p.variance for p in predictions if p.variance is not None]
+    v_0 = None if prior_variance is None else _positive("prior_variance", prior_variance, (K, C))
+    if len(variances) < K:
+        v_0 = None
+    probability = np.empty((len(predictions[0]), C))
+    variance = np.empty_like(probability) if v_0 is not None and np.allclose(v_0, v_0[0], rtol=1e-6) else None
+
+    def run(rows: slice) -> None:
+        answers = [np.maximum(p.probability[rows], FLOOR) for p in predictions]
+        left = None if v_0 is None else np.stack([v[rows] for v in variances]) / v_0[:, None]
+        left = None if left is None else np.clip(left, FLOOR, 1)
+        b = _weights(weights, answers, p_0, observed[:, rows], left)
+        probability[rows] = _pooled(answers, p_0, b)
+        if variance is not None and v_0 is not None and left is not None:
+            variance[rows] = v_0[0] / (1 + (b[:, :, None] * (1 / left - 1)).sum(axis=0))
+
+    parallel_map(run, slices(len(probability), _CHUNK))
+    known = np.logical_or.reduce(observed)
+    occupancy = _fused_occupancy(predictions, prior_occupancy, weights)
+    return Prediction(classes, probability, known, variance=variance, occupancy=occupancy)
 
 
 def _fused_occupancy(
@@ -170,7 +177,7 @@ def _fused_occupancy(
     q_0 = np.array([1 - prior, prior])
     answers = [np.maximum(np.column_stack([1 - o.probability, o.probability]), FLOOR) for o in given]
     known = np.stack([o.known for o in given])
-    q = _pooled(answers, q_0, _weights(answers, q_0, known, weights))
+    q = _pooled(answers, q_0, _weights(weights, answers, q_0, known))
     return OccupancyPrediction(q[:, 1], np.logical_or.reduce(known))
 
 
@@ -183,23 +190,18 @@ def _pooled(answers: Answers, prior: Array, b: Array) -> Array:
 
 
 def _weights(
-    answers: Answers, prior: Array, observed: NDArray[np.bool_], weights: Weights, learned: Answers | None = None
+    weights: Weights, answers: Answers, prior: Array, observed: NDArray[np.bool_], left: Array | None = None
 ) -> Array:
-    """Weights (K, M); what was learned is told by the answers themselves unless given."""
+    """Weights (K, M), given the shares of the prior variances that are left (K, M, C), if there are any."""
     if weights == "one":
         return observed.astype(np.float64)
-    gain = [rel_entr(p, prior).sum(axis=1) for p in answers] if learned is None else learned
-    share = np.maximum(np.stack(gain), 0) * observed
+    if left is None:
+        learned = np.stack([rel_entr(p, prior).sum(axis=1) for p in answers])
+    else:
+        learned = -np.log(left).mean(axis=2) / 2
+    share = np.maximum(learned, 0) * observed
     share = np.where(share.sum(axis=0) > 0, share, observed)
     return np.asarray(share / np.maximum(share.sum(axis=0), np.finfo(np.float64).tiny))
-
-
-def _variances(predictions: Sequence[Prediction], v_0: Array) -> Answers:
-    """The variances, none above the prior's; an empty list where some are missing."""
-    given = [p.variance for p in predictions if p.variance is not None]
-    if len(given) < len(predictions):
-        return []
-    return [np.clip(v, FLOOR * most, most) for v, most in zip(given, v_0)]
 
 
 def _positive(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

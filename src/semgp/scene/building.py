@@ -23,7 +23,7 @@ from semgp.voxels import voxel_keys
 ROBOT_HEIGHT, MAST = 1.1, 1.0
 """Height of the robot, and of the lidar on it, above the floor in metres."""
 
-INDOOR_LIDAR = Lidar(beams=16, columns=360, top=45, bottom=-45, reach=6.0, noise=0.01)
+INDOOR_LIDAR = Lidar(beams=16, columns=360, top=30, bottom=-30, reach=6.0, noise=0.01)
 """A small lidar that sees floor and ceiling, but not far: exploring a building takes many scans."""
 
 _SILL = 0.03  # metres: what is lower does not stop the robot

@@ -1,6 +1,6 @@
 """Ghosts of moving objects in the map of a SemanticKITTI sequence, with and without forgetting.
 
-    uv run benchmarks/forgetting.py DATA/semantickitti_08
+    uv run benchmarks/ghosts.py DATA/semantickitti_08
 
 Moving objects are those whose raw ids in the truth are 252 to 259. A ghost is a place where one was in an earlier
 scan, half a metre or more from every moving object of the last scan, and of which the map of all scans says that
@@ -55,9 +55,8 @@ def main(folder: Path) -> None:
         },
     }
     print(f"{len(places):,} places where something moved, {len(static):,} points that did not")
-    print(
-        "| map | ghosts | share | static mIoU % | accuracy % | NLL | update + solve, s |\n|---|---|---|---|---|---|---|"
-    )
+    print("| map | ghosts | share | static mIoU % | accuracy % | NLL | update + solve, s |")
+    print("|---|---|---|---|---|---|---|")
     for name, gp in maps.items():
         start = perf_counter()
         for cloud in scans:

@@ -1,6 +1,6 @@
 """Free space in the GP map against the Semantic OctoMap: agreement, log-loss of a scan held out, cost.
 
-    uv run benchmarks/free_space.py DATA
+    uv run benchmarks/occupancy.py DATA
 
 DATA is the folder that holds `semantickitti_08` and `nyu`. On SemanticKITTI the map is built from the scans; of an
 NYU frame, whose pixels are one view, ten interleaved parts stand for ten scans. The OctoMap is certain of voxels

@@ -1,6 +1,6 @@
 """Maps from scans whose poses are wrong, with and without knowing how wrong they may be.
 
-    uv run benchmarks/uncertain_poses.py DATA/semantickitti_08
+    uv run benchmarks/pose_noise.py DATA/semantickitti_08
 
 Each scan's pose is moved and turned at random. The map, built from a network's labels at the places where the
 wrong poses put them, is asked at every truly labelled point at its right place. "ignored" takes the poses as
