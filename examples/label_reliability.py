@@ -3,12 +3,12 @@
     uv run examples/label_reliability.py --out label_reliability.png
 
 A car scans a street. Its network takes some classes for others, and the farther away a point is, the more often it
-says anything at all; patches of half a metre get one error in each scan. From how the scans agree, semgp learns how
+says anything at all; patches of half a metre get one error in each scan. From how scans agree, semgp learns how
 much a label counts by its range, and which classes are said for which.
 
-Above: confidence by range, and what is said of each class, as learned and as counted with the truth, which learning
-never sees. Of rare classes little can be learned: they stay near what is believed beforehand. Below: maps of the
-same scans, with labels that all count alike, or as far as they can be trusted; one point of each voxel is scored.
+Above: confidence by range, and what is said of each class, as learned and as counted with the truth, which is not
+used for learning. Of rare classes little can be learned: they stay near what is believed beforehand. Below: maps
+of the same scans, with labels that all count alike, or as far as they can be trusted; one point a voxel is scored.
 Trust by range clears up what is far; trust by class brings back what is said less often than it is there.
 """
 
@@ -71,7 +71,7 @@ def counted(truth: LabelledCloud, said: LabelledCloud, ranges: Array) -> tuple[A
 
 def joined(scans: list[LabelledCloud]) -> LabelledCloud:
     points, labels = zip(*((scan.points, scan.hard_labels) for scan in scans))
-    return LabelledCloud(np.vstack(points), CLASSES, np.concatenate(labels))
+    return LabelledCloud(np.concatenate(points), CLASSES, np.concatenate(labels))
 
 
 def show_matrix(axes: Axes, matrix: Array, title: str) -> None:
@@ -116,10 +116,9 @@ def main() -> None:
         labels[f"{name}: accuracy {s.accuracy:.1%}, mIoU {s.miou:.1%}, NLL {s.nll:.3f}"] = found.label
     print(*list(labels)[1:], sep="\n")
 
-    figure = Figure(figsize=(16, 12.4), layout="constrained")
+    figure = Figure(figsize=(16, 11.8), layout="constrained")
     FigureCanvasAgg(figure)
-    upper, lower = figure.subfigures(2, 1)
-    curve, by_truth, learned = upper.subplots(1, 3)
+    curve, by_truth, learned, *panels, last = figure.subplots(3, 3, height_ratios=(1.95, 1, 1)).flatten()
     curve.plot(ranges, worth, "o", color="#f57900", label="counted with the truth")
     curve.plot(ranges, law.at(ranges), color="#3465a4", linewidth=2.5, label="learned without it")
     curve.set(title="how much a label counts", xlabel="range (m)", ylabel="confidence", ylim=(0, 1.05))
@@ -127,7 +126,6 @@ def main() -> None:
     curve.legend()
     show_matrix(by_truth, table, "what is said (%), counted with the truth")
     show_matrix(learned, confusion.matrix, "what is said (%), learned without it")
-    *panels, last = lower.subplots(2, 3).flat
     for axes, (title, label) in zip(panels, labels.items()):
         axes.imshow(splat(scored.points, by_class(label, CLASSES), VIEW, size=0.22))
         axes.set_title(title, size=11)

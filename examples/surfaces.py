@@ -5,10 +5,10 @@
 A depth camera goes once around a furnished room: noisy points, one in nine with a label, some of those wrong, and
 one lamp that no view labels. The mesh is as fine as the lattice on which the map is asked; the map stays the same.
 
-Above: the surface on which something is there with probability 0.7, in the colours of the most probable classes,
+Above: the surface on which something is there with probability 1/2, in the colours of the most probable classes,
 seen through the near walls and without the ceiling. Below: how unsure the map is of the class that it shows, most
 of all of the lamp without labels, and where furniture hid the floor; and one class alone, the surface on which a
-chair is there with probability 0.7. The finer mesh of the room is written beside the picture, as a PLY file with
+chair is there with probability 1/2. The finer mesh of the room is written beside the picture, as a PLY file with
 labels and uncertainty at its vertices.
 """
 
@@ -26,7 +26,6 @@ from semgp.scene import DepthCamera
 from semgp.surfaces import Mesh, surface, write_mesh
 
 LOW, HIGH = (-3.0, -2.5, -0.5), (3.0, 2.5, 2.45)  # metres: the room without its ceiling
-LEVEL = 0.7  # probability on the surfaces; where it is 1/2 is a third of a voxel further out
 LAMP = np.array([-0.5, -0.3, 0.8])  # direction to the light
 SIZE = (1000, 640)  # pixels of each picture
 
@@ -68,11 +67,11 @@ def main() -> None:
     for scan in scans:
         room_map.update(scan.observed)
 
-    coarse = surface(room_map, resolution=0.1, level=LEVEL, low=LOW, high=HIGH)
-    fine = surface(room_map, resolution=0.04, level=LEVEL, low=LOW, high=HIGH)
+    coarse = surface(room_map, resolution=0.1, low=LOW, high=HIGH)
+    fine = surface(room_map, resolution=0.04, low=LOW, high=HIGH)
     of_chairs = fine.vertices[fine.label == room.classes.index("chair")]
     low, high = np.quantile(of_chairs, (0.01, 0.99), axis=0)
-    chairs = surface(room_map, "chair", resolution=0.02, level=LEVEL, low=low - 0.15, high=high + 0.15)
+    chairs = surface(room_map, "chair", resolution=0.02, low=low - 0.15, high=high + 0.15)
 
     truth = LabelledCloud(
         np.vstack([scan.truth.points for scan in scans]),

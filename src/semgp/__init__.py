@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from semgp.maps.fusion import fuse
     from semgp.maps.gp import GPSemanticMap
     from semgp.maps.learning import learn_model
+    from semgp.maps.pooling import fuse_predictions
     from semgp.maps.presets import PRESETS
     from semgp.octomap import SemanticOctoMap
     from semgp.prediction import Prediction
@@ -43,6 +44,7 @@ __all__ = [
     "SemanticOctoMap",
     "SemgpError",
     "fuse",
+    "fuse_predictions",
     "learn_blocks",
     "learn_from_scans",
     "learn_model",
@@ -68,6 +70,7 @@ _HOME = {
     "Forgetting": "semgp.maps.forgetting",
     "fuse": "semgp.maps.fusion",
     "Committee": "semgp.maps.committee",
+    "fuse_predictions": "semgp.maps.pooling",
     "learn_model": "semgp.maps.learning",
     "SemanticOctoMap": "semgp.octomap",
     "Prediction": "semgp.prediction",

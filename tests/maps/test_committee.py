@@ -19,10 +19,11 @@ from semgp.errors import InputError
 from semgp.gp.kernels import Kernel
 from semgp.gp.model import GPModel
 from semgp.gp.stationary import Matern52
-from semgp.maps.committee import Committee, Weights, fuse_predictions
+from semgp.maps.committee import Committee
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.fusion import fuse
 from semgp.maps.gp import GPSemanticMap
+from semgp.maps.pooling import Weights, fuse_predictions
 from semgp.maps.protocol import SemanticMap
 from semgp.octomap import SemanticOctoMap
 from semgp.prediction import OccupancyPrediction, Prediction

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
 from zlib import crc32
 
 import numpy as np
 
-from semgp.blocks.arrays import F32, F64, I32, I64
+from semgp.blocks.arrays import F32, I64
 from semgp.blocks.field import Field
-from semgp.blocks.sites import DRAWS
+from semgp.blocks.observations import DRAWS, Observations
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 
 COLOURS = ("red", "green", "blue")
-
-
-class Inputs(NamedTuple):
-    """What `Field.add` takes of a cloud: its labelled points and what belongs to them."""
-
-    points: F64
-    labels: I32 | None
-    weights: F32 | None
-    features: F32
-    confidence: F32 | None
-    variances: F64 | None
-    draws: I64 | None
 
 
 def add_cloud(field: Field, cloud: LabelledCloud) -> None:
@@ -39,7 +26,7 @@ def add_cloud(field: Field, cloud: LabelledCloud) -> None:
     field.add(*cloud_inputs(cloud, field.model.features))
 
 
-def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Inputs:
+def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Observations:
     """Return what a field takes of a cloud, with features by name.
 
     Raises
@@ -50,7 +37,7 @@ def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Inputs:
     columns = cloud_features(cloud, features)
     keep = cloud.labelled
     certain = cloud.covariances is None and cloud.pose_covariance is None
-    return Inputs(
+    return Observations(
         cloud.points[keep],
         None if cloud.labels is None else cloud.labels[keep],
         None if cloud.weights is None else cloud.class_weights[keep],

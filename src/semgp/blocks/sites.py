@@ -6,7 +6,6 @@ and any number of threads give the same bits.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgp.blocks.accumulate import (
-    MASS_UNIT,
     PLACE_UNIT,
     add_hard,
     add_soft,
@@ -24,17 +22,13 @@ from semgp.blocks.accumulate import (
     fade_rows,
 )
 from semgp.blocks.arrays import F32, F64, I32, I64, U32, Bool
+from semgp.blocks.observations import Observations, counted
 from semgp.errors import InputError
 from semgp.voxels import VoxelTable, voxel_indices, voxel_keys, voxel_origin
 
 CELL_BITS = 6
 CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
-
-DRAWS = 48
-"""Bits of a site's set of draws, see `Sites.spread`."""
-
-_LARGEST_WEIGHT, _LARGEST_FEATURE, _LARGEST_VARIANCE = 64, 30_000, 100
 
 
 class Sites:
@@ -140,54 +134,15 @@ class Sites:
         variances: F64 | None = None,
         draws: I64 | None = None,
     ) -> I32:
-        """Add labelled points, hard or soft, and return the cells that they lie in.
-
-        Parameters
-        ----------
-        points : (N, 3) array
-            Metres.
-        labels : (N,) array or None
-            Hard labels.
-        weights : (N, C) array or None
-            Soft labels instead.
-        features : (N, F) array
-            Inputs beyond position.
-        confidence : (N,) array, optional
-            What each label counts, 0 to 1.
-        variances : (N, 3) array, optional
-            Variance of each position, m^2.
-        draws : (N,) array, optional
-            With variances, one of `DRAWS` bits a point: points displaced together have the same.
+        """Add labelled points, see `Observations`, and return the cells that they lie in.
 
         Raises
         ------
         InputError
             Points a million voxels from the first, or weights, features or variances beyond what a sum can hold.
         """
-        if not len(points):
-            return np.empty(0, dtype=np.int32)
-        if variances is not None and variances.max() > _LARGEST_VARIANCE:
-            raise InputError(
-                f"positions must be known to {math.sqrt(_LARGEST_VARIANCE):g} m, a variance of "
-                f"{_LARGEST_VARIANCE} m^2: drop points that are less certain."
-            )
-        if weights is not None and weights.max() > _LARGEST_WEIGHT:
-            raise InputError(f"weights of soft labels must be {_LARGEST_WEIGHT} at most: divide them.")
-        if np.abs(features).max(initial=0) > _LARGEST_FEATURE:
-            raise InputError(f"features must lie within {_LARGEST_FEATURE} of 0: scale them.")
-        amounts = np.full(len(points), MASS_UNIT)
-        if confidence is not None:
-            amounts = np.rint(confidence * MASS_UNIT).astype(np.int64)
-        heavy = amounts > 0
-        if weights is not None:
-            weights = weights if confidence is None else weights * confidence[:, None]
-            heavy = np.rint(weights * MASS_UNIT).sum(axis=1) > 0
-        if not heavy.all():
-            points, features, amounts = points[heavy], features[heavy], amounts[heavy]
-            labels = None if labels is None else labels[heavy]
-            weights = None if weights is None else weights[heavy]
-            variances = None if variances is None else variances[heavy]
-            draws = None if draws is None else draws[heavy]
+        given = Observations(points, labels, weights, features, confidence, variances, draws)
+        (points, labels, weights, features, _, variances, draws), amounts = counted(given)
         if not len(points):
             return np.empty(0, dtype=np.int32)
         origin = self.origin

@@ -79,13 +79,18 @@ class ManyBlocks:
             return
         now = 0.0 if self.forgetting is None else self.forgetting.clock(cloud, self._field.sites.clock)
         rays = self.occupancy.sample(cloud, watch=self.forgetting is not None)
-        if self._field.sites.origin is None:
-            origin = cell_origin(cloud.points, self.model.resolution)
-            self._field.sites.origin = self.occupancy.field.sites.origin = origin
+        self._share_origin(cloud)
         if self.forgetting is not None:
             self._forget(self.forgetting, rays, now)
         self._field.add(*inputs)
         self.occupancy.add(rays)
+
+    def _share_origin(self, cloud: LabelledCloud) -> None:
+        """Have the keys of both fields begin at one voxel: passed voxels are found in both."""
+        known = [field.sites.origin for field in self._fields.values() if field.sites.origin is not None]
+        origin = known[0] if known else cell_origin(cloud.points, self.model.resolution)
+        for field in self._fields.values():
+            field.sites.origin = origin
 
     def _forget(self, forgetting: Forgetting, rays: Rays, now: float) -> None:
         """Fade what a cloud's rays come near, and what they pass through."""

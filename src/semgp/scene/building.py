@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import cos, sin
+from math import cos, isfinite, sin
 from numbers import Integral
 
 import numpy as np
@@ -32,7 +32,7 @@ _SURVEY_STEP = 1.5  # metres between the places that a survey scans from
 
 @dataclass(frozen=True, eq=False)
 class SyntheticBuilding:
-    """One floor of a building, 20 m x 15 m: seven to ten furnished rooms along a corridor, all doors open.
+    """One floor of a building, 20 m x 15 m: eight to ten furnished rooms on a corridor, their doors open.
 
     The plan's origin is the south-western corner of the floor. A round robot comes in at the western end of the
     corridor; wherever it goes, it can scan.
@@ -95,10 +95,12 @@ class SyntheticBuilding:
         InputError
             A position of another shape, or numbers that are not finite.
         """
+        if not isfinite(heading):
+            raise InputError(f"a heading is an angle in radians, not {heading}.")
         T = np.eye(4)
         T[:2, :2] = (cos(heading), -sin(heading)), (sin(heading), cos(heading))
         T[:3, 3] = *_plan_points(np.asarray(position)[None])[0], MAST
-        return rigid_transform("the pose", T)
+        return T
 
     def scan(self, T_world_sensor: ArrayLike, number: int = 0) -> LabelledCloud:
         """Return what the lidar sees: points, labels as a network gives them, and the pose.
@@ -138,7 +140,7 @@ class SyntheticBuilding:
         points : (N, 2) array
             Middles of the robot in metres.
         radius : float
-            The robot's, in metres. It is an upright cylinder, 1.1 m high, and does not drive under tables.
+            The robot's, in metres; it is 1.1 m high, and does not drive under tables.
 
         Raises
         ------
@@ -191,8 +193,10 @@ class SyntheticBuilding:
         Raises
         ------
         InputError
-            A robot that does not fit where it begins, or a resolution too fine.
+            A robot that does not fit where it begins, or a resolution that is not positive.
         """
+        if not 0 < resolution < np.inf:
+            raise InputError(f"a resolution must be above zero, but is {resolution}.")
         places = self.reachable(radius)
         _, one_each = np.unique(places // _SURVEY_STEP, axis=0, return_index=True)
         rays = self.lidar.rays.reshape(-1, 3)

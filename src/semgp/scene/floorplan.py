@@ -26,14 +26,20 @@ BUILDING_CLASSES = Classes(
 )
 """The nine classes of the building."""
 
+_MISTAKEN_FOR = {
+    "floor": ("wall", "door"),
+    "wall": ("door", "cabinet"),
+    "ceiling": ("wall", "shelf"),
+    "door": ("wall", "cabinet"),
+    "table": ("cabinet", "chair"),
+    "chair": ("table", "plant"),
+    "cabinet": ("shelf", "door"),
+    "shelf": ("cabinet", "wall"),
+    "plant": ("chair", "shelf"),
+}
+
 MISTAKEN_FOR = np.array(
-    [
-        [BUILDING_CLASSES.index(other) for other in others]
-        for others in (
-            *(("wall", "door"), ("door", "cabinet"), ("wall", "shelf"), ("wall", "cabinet"), ("cabinet", "chair")),
-            *(("table", "plant"), ("shelf", "door"), ("cabinet", "wall"), ("chair", "shelf")),
-        )
-    ],
+    [[BUILDING_CLASSES.index(other) for other in _MISTAKEN_FOR[name]] for name in BUILDING_CLASSES.names],
     dtype=np.int32,
 )
 """Labels (9, 2) of the classes that a network is apt to take each class for."""
@@ -160,7 +166,7 @@ def _door() -> Thing:
 def _furnish(
     rng: np.random.Generator, room: Area, use: tuple[str, ...], standing: list[Thing], way: float = 0.05
 ) -> list[Thing]:
-    """Return the furniture of a room, each piece where there is space for it and a way between it and the others."""
+    """Return the furniture of a room: each piece where there is space, with a way between it and the others."""
     taken = [_footprint([thing]).grown(_DOOR_CLEARANCE) for thing in standing if thing.name == "door"]
     inner, placed = room.grown(-_HALF_WALL - 0.02), list[Thing]()
     for piece in use:
@@ -219,14 +225,9 @@ def _plant(rng: np.random.Generator) -> Thing:
 def _footprint(things: list[Thing]) -> Area:
     """Return the rectangle that some things fill, seen from above."""
     solids = [solid for thing in things for solid in thing.solids]
+    middle, half = (np.array([getattr(solid, name)[:2] for solid in solids]) for name in ("centre", "half"))
     yaw = np.array([solid.yaw for solid in solids])
     c, s = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
-    (x, y, _), (dx, dy, _) = (
-        np.array([solid.centre for solid in solids]).T,
-        np.array([solid.half for solid in solids]).T,
-    )
-    x_reach, y_reach = c * dx + s * dy, s * dx + c * dy
-    return Area(
-        (float((x - x_reach).min()), float((x + x_reach).max())),
-        (float((y - y_reach).min()), float((y + y_reach).max())),
-    )
+    reach = np.stack([c * half[:, 0] + s * half[:, 1], s * half[:, 0] + c * half[:, 1]], axis=1)
+    (left, bottom), (right, top) = (middle - reach).min(axis=0), (middle + reach).max(axis=0)
+    return Area((float(left), float(right)), (float(bottom), float(top)))

@@ -2,16 +2,17 @@
 
     uv run benchmarks/map_fusion.py DATA/semantickitti_08
 
-The halves a and b are every other scan, or the first and the second half. "turned" is a frame of its own, turned by
-30 degrees about the vertical and shifted by some metres, in which b is built before it is fused or joins the
+The halves a and b are every other scan, or the first and the second half. "turned" is a frame of its own, turned
+by 30 degrees about the vertical and shifted by some metres, in which b is built before it is fused or joins the
 committee; the map of all scans in that frame tells how much the grid alone decides. All maps are asked at every
 truly labelled point. Seconds are those of building (halves), fusing (fused maps) and solving, and of the query.
-Differences are the largest and the mean one from the map of all scans, of class probabilities and of occupancy, and
-"occupied" is the share of the points, all of them on surfaces, of which a map says so.
+Changes are the largest and the mean difference from the map of all scans, of class probabilities and of occupancy,
+and "occupied" is the share of the points, all of them on surfaces, of which a map says so.
 """
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -23,10 +24,11 @@ from semgp.cloud import LabelledCloud
 from semgp.evaluation.measure import timed
 from semgp.evaluation.scores import score
 from semgp.evaluation.semantic_kitti import VERTICAL, kitti_sequence, kitti_task
-from semgp.maps.committee import Committee, Weights
+from semgp.maps.committee import Committee
 from semgp.maps.free_space import FreeSpace, occupancy_model
 from semgp.maps.fusion import fuse
 from semgp.maps.gp import GPSemanticMap
+from semgp.maps.pooling import Weights
 from semgp.maps.presets import OUTDOOR_LIDAR, with_vertical
 from semgp.prediction import OCCUPIED, Prediction
 
@@ -89,20 +91,20 @@ def main(folder: Path) -> None:
         )
 
     everywhere, turned = truth.points, [elsewhere(cloud, T_a_b) for cloud in scans]
-    row("all scans", *timed(lambda: built(scans)), everywhere)
-    row("all scans, turned", *timed(lambda: built(turned)), elsewhere(truth, T_a_b).points)
+    row("all scans", *timed(partial(built, scans)), everywhere)
+    row("all scans, turned", *timed(partial(built, turned)), elsewhere(truth, T_a_b).points)
     n = len(scans) // 2
     for halves, first, second in (
         ("every other", slice(None, None, 2), slice(1, None, 2)),
         ("first, second", slice(n), slice(n, None)),
     ):
-        a, a_seconds = timed(lambda: built(scans[first]))
-        b, b_seconds = timed(lambda: built(scans[second]))
+        a, a_seconds = timed(partial(built, scans[first]))
+        b, b_seconds = timed(partial(built, scans[second]))
         b_turned = built(turned[second])
         row(f"{halves}: a alone", a, a_seconds, everywhere)
         row(f"{halves}: b alone", b, b_seconds, everywhere)
-        row(f"{halves}: fused", *timed(lambda: fuse(a, b)), everywhere)
-        row(f"{halves}: fused, b turned", *timed(lambda: fuse(a, b_turned, T_a_b)), everywhere)
+        row(f"{halves}: fused", *timed(partial(fuse, a, b)), everywhere)
+        row(f"{halves}: fused, b turned", *timed(partial(fuse, a, b_turned, T_a_b)), everywhere)
         for weights in WEIGHTS:
             row(f"{halves}: committee, weights {weights}", Committee((a, b), weights=weights), 0.0, everywhere)
         both = Committee((a, b_turned), (np.eye(4), T_a_b))
