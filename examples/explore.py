@@ -3,14 +3,15 @@
     uv run examples/explore.py --out explore.png
 
 A round robot with a small lidar comes in at the western end of the corridor. It knows its map and nothing else: it
-drives to where the map says that nothing is, scans there, and chooses again. It chooses the place whose scan is
-expected to tell most for each metre of way, the place nearest to a frontier of the unknown, or any place. All three
-have the same start, sensor and number of scans, in the same buildings.
+drives where the map says that nothing is, scans, and chooses again: the place whose scan is expected to tell most
+for each metre of way, the nearest place at a frontier of the unknown, or any place. All three have the same start,
+sensor and number of scans, in the same buildings.
 
-Above: how much of the surfaces that can be seen is known, over metres driven and over scans, and how uncertain
-the map is on average about what is free; thick lines are means over the buildings. Below: what each robot has mapped
-of the first building, seen from above, in the colours of the classes; grey is unknown, thin lines are the true rooms.
-The way leads from the star to the circle, with a dot for each scan.
+Above: how much of the surfaces that can be seen is known, over metres driven and over scans, and how uncertain the
+map is on average about what is free, over metres (random goals drive on beyond the axis). Thick lines are means
+over the buildings, thin ones single buildings. Below: what each robot has mapped of the first building, from above,
+in the colours of the classes; grey is unknown, thin lines are the true rooms. The way leads from the star to the
+circle, with a dot for each scan. Information tells most for each scan; frontiers, one after the other, save way.
 """
 
 import argparse
@@ -23,6 +24,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import PercentFormatter
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import coo_array
@@ -42,17 +44,17 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 RADIUS, CLEARANCE = 0.2, 0.3  # metres: the robot's own, and the one it plans with
-CELL, HEIGHTS = 0.2, (0.15, 1.15)  # metres: the grid it plans on, and between which heights it could touch something
-NEW_PLACE = 1.0  # metres from all earlier scans
-SQUARE, RAYS = 1.5, {"beams": 8, "columns": 24}  # one view a square of so many metres is rated, by so many rays
+CELL = 0.2  # metres, of the grid it plans on
+BODY = 0.15, 1.15  # metres: heights at which it could touch something
 LEVEL = 0.8, 1.2  # metres: frontiers are looked for about the height of the lidar
 FRONTIER, AT_FRONTIER = 8, 0.5  # cells of a frontier that is worth a visit, and how near one gets, in metres
+SQUARE, RAYS = 1.5, {"beams": 8, "columns": 24}  # one view a square of so many metres is rated, by so many rays
+NEW_PLACE = 1.0  # metres from all earlier scans
 
 
 def new_map(building: SyntheticBuilding) -> SpatialMap:
-    """Return an empty map. Others that keep free space do as well, such as SemanticOctoMap(building.classes, 0.1)."""
-    model = replace(GENERAL, resolution=0.1)
-    return GPSemanticMap(building.classes, model, tolerance=0.2, free=FreeSpace())
+    """Return an empty map; any that keeps free space does, such as SemanticOctoMap(building.classes, 0.1)."""
+    return GPSemanticMap(building.classes, replace(GENERAL, resolution=0.1), tolerance=0.2, free=FreeSpace())
 
 
 class Truth:
@@ -69,7 +71,7 @@ class Truth:
         self.borders = [len(surfaces), len(surfaces) + len(floor)]
 
     def judge(self, semantic_map: SpatialMap) -> tuple[float, float, float, float]:
-        """Return which shares of surfaces and floor are known, of known labels right, and the mean entropy (nats)."""
+        """Return the shares of surfaces and floor known, of known labels right, and the mean entropy in nats."""
         prediction = semantic_map.query(self.points)
         occupancy = prediction.occupancy
         assert occupancy is not None
@@ -99,7 +101,7 @@ class Roads:
 
 @dataclass(eq=False)
 class Robot:
-    """A robot in a building with its map; a row of `records` for each scan: metres driven, and what `Truth` says."""
+    """A robot in a building, its map, and for each scan a record: metres driven, and what `Truth.judge` says."""
 
     building: SyntheticBuilding
     truth: Truth
@@ -112,6 +114,7 @@ class Robot:
     records: list[tuple[float, ...]] = field(default_factory=list)
 
     def scan(self) -> None:
+        """Scan from where it stands, and keep a record."""
         place = self.way[-1]
         self.map.update(self.building.scan(self.building.pose(place), len(self.records)))
         self.scanned_at.append(place)
@@ -128,7 +131,7 @@ class Robot:
 
     def roads(self) -> Roads:
         """Return the shortest ways over cells that the map knows to be free, to their eight neighbours."""
-        grid = occupancy_grid(self.map, (0, 0), self.building.size[:2], heights=HEIGHTS, resolution=CELL)
+        grid = occupancy_grid(self.map, (0, 0), self.building.size[:2], heights=BODY, resolution=CELL)
         for x, y in self.touched:
             grid.data[int(y / CELL), int(x / CELL)] = 100
         row, column = np.indices(grid.data.shape)
@@ -136,25 +139,13 @@ class Robot:
         from_robot = np.linalg.norm(centres - self.way[-1], axis=-1)
         from_obstacle = CELL * ndimage.distance_transform_edt(grid.data < 50)
         free = ((grid.data >= 0) & (from_obstacle > CLEARANCE)) | (from_robot < CLEARANCE)
-        number = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-        a, b, length = (np.concatenate(part) for part in zip(*map(_edges, [number] * 4, _STEPS)))
-        n = np.count_nonzero(free)
-        graph = coo_array((length, (a, b)), (n, n)).tocsr()
-        metres, before = dijkstra(graph, False, number.flat[from_robot.argmin()], return_predecessors=True)
-        return Roads(centres[free], metres, before)
-
-
-_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
-
-
-def _edges(number: NDArray[np.int64], step: tuple[int, int]) -> tuple[Indices, Indices, Array]:
-    """Return the numbers of cells and of their neighbours a step away, where both have one (-1 is none), in metres."""
-    down, right = step
-    rows, columns = number.shape
-    a = number[: rows - down, max(0, -right) : columns - max(0, right)].ravel()
-    b = number[down:, max(0, right) : columns - max(0, -right)].ravel()
-    both = (a >= 0) & (b >= 0)
-    return a[both], b[both], np.full(np.count_nonzero(both), CELL * np.hypot(down, right))
+        cells = centres[free]
+        a, b = cKDTree(cells).query_pairs(1.5 * CELL, output_type="ndarray").T
+        length = np.linalg.norm(cells[a] - cells[b], axis=1)
+        graph = coo_array((length, (a, b)), (len(cells), len(cells))).tocsr()
+        start = np.linalg.norm(cells - self.way[-1], axis=1).argmin()
+        metres, before = dijkstra(graph, False, start, return_predecessors=True)
+        return Roads(cells, metres, before)
 
 
 def by_information(robot: Robot, roads: Roads, candidates: Indices) -> int:
@@ -197,9 +188,8 @@ STRATEGIES: dict[str, tuple[Callable[[Robot, Roads, Indices], int], str]] = {
 
 def explore(building: SyntheticBuilding, truth: Truth, strategy: str, scans: int) -> Robot:
     """Return the robot after so many scans, or when there is no new place to scan from."""
-    robot = Robot(
-        building, truth, new_map(building), np.random.default_rng(building.seed), way=[building.entrance]
-    )
+    rng = np.random.default_rng(building.seed)
+    robot = Robot(building, truth, new_map(building), rng, way=[building.entrance])
     robot.scan()
     while len(robot.records) < scans:
         roads = robot.roads()
@@ -212,7 +202,7 @@ def explore(building: SyntheticBuilding, truth: Truth, strategy: str, scans: int
     return robot
 
 
-def curves(axes: Axes, runs: dict[str, list[Robot]], x: int | None, y: int, title: str, unit: str) -> None:
+def curves(axes: Axes, runs: dict[str, list[Robot]], x: int | None, y: int, title: str) -> None:
     """Draw a column of the records over another one, or over the number of scans."""
     furthest = 0.0
     for strategy, (_, colour) in STRATEGIES.items():
@@ -224,7 +214,7 @@ def curves(axes: Axes, runs: dict[str, list[Robot]], x: int | None, y: int, titl
         mean = np.mean([np.interp(common, xs, r[:, y]) for xs, r in zip(over, records)], axis=0)
         axes.plot(common, mean, color=colour, linewidth=2.6, label=strategy)
         furthest = max(furthest, common[-1] if strategy != "random goals" else 0)
-    axes.set(title=title, xlabel="scans" if x is None else "metres driven", ylabel=unit, xlim=(0, furthest))
+    axes.set(title=title, xlabel="scans" if x is None else "metres driven", xlim=(0, furthest))
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
 
@@ -257,19 +247,18 @@ def draw(runs: dict[str, list[Robot]], out: Path) -> None:
     figure = Figure(figsize=(15, 9.2), layout="constrained")
     FigureCanvasAgg(figure)
     top = [figure.add_subplot(2, 3, i + 1) for i in range(3)]
-    curves(top[0], runs, 0, 1, "surfaces known", "share")
-    curves(top[1], runs, None, 1, "surfaces known", "share")
-    curves(top[2], runs, 0, 4, "entropy of free or occupied", "nats, mean over the building")
+    curves(top[0], runs, 0, 1, "surfaces known, by way driven")
+    curves(top[1], runs, None, 1, "surfaces known, by scans")
+    curves(top[2], runs, 0, 4, "entropy of free or occupied: mean over the building, nats")
     top[1].legend(loc="lower right", framealpha=0.9)
     for axes in top[:2]:
         axes.set_ylim(0, 1)
+        axes.yaxis.set_major_formatter(PercentFormatter(1))
     for i, (strategy, robots) in enumerate(runs.items()):
         floor_plan(figure.add_subplot(2, 3, 4 + i), robots[0], strategy)
     classes = runs["random goals"][0].map.classes
-    handles = [
-        Patch(color=np.array(colour) / 255, label=name) for name, colour in zip(classes.names, classes.colours)
-    ]
-    handles = [handle for handle in handles if handle.get_label() not in ("floor", "ceiling")]
+    colours = {name: f"#{r:02x}{g:02x}{b:02x}" for name, (r, g, b) in zip(classes.names, classes.colours)}
+    handles = [Patch(color=c, label=name) for name, c in colours.items() if name not in ("floor", "ceiling")]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
     figure.savefig(out, dpi=110)
 
@@ -282,10 +271,7 @@ def main() -> None:
     args = parser.parse_args()
 
     runs: dict[str, list[Robot]] = {strategy: [] for strategy in STRATEGIES}
-    print(
-        f"{'building':>8}  {'strategy':22} {'scans':>5} {'metres':>6} {'surfaces':>8} {'floor':>6} {'right':>6} "
-        f"{'entropy':>8} {'touched':>7}"
-    )
+    print("building  strategy               scans  metres  surfaces  floor  right  entropy  touched")
     for seed in range(args.seeds):
         building = SyntheticBuilding(seed)
         truth = Truth(building)
@@ -295,8 +281,8 @@ def main() -> None:
             for i in (len(robot.records) // 2, len(robot.records)):
                 metres, surfaces, floor, right, entropy = robot.records[i - 1]
                 print(
-                    f"{seed:8}  {strategy:22} {i:5} {metres:6.1f} {surfaces:8.1%} {floor:6.1%} {right:6.1%} "
-                    f"{entropy:8.3f} {len(robot.touched):7}"
+                    f"{seed:8}  {strategy:22} {i:5}  {metres:6.1f}  {surfaces:8.1%}  {floor:5.1%}  {right:5.1%}  "
+                    f"{entropy:7.3f}  {len(robot.touched):7}"
                 )
     draw(runs, args.out)
     print(args.out)

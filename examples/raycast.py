@@ -2,7 +2,7 @@
 
     uv run examples/raycast.py --out raycast.png
 
-A lidar scans a building from twelve places; a tenth of its labels are wrong, in patches. Then 480 x 320 rays of a
+A lidar scans a building from twelve places; a tenth of its labels are wrong, in patches. Then 432 x 288 rays of a
 camera go out into the map, and each answers where it first meets something, what that is, and how sure the map is.
 
 From the left: the class that is met and how far away it is, in truth above and in the map below; the probability
@@ -11,6 +11,7 @@ cost grid, from below the floor up to the robot's height, with the places of the
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,9 +35,9 @@ Array = NDArray[np.float64]
 
 BUILDING = SyntheticBuilding(seed=0, lidar=Lidar(beams=64, columns=720, top=45, bottom=-45, reach=8, noise=0.01))
 CLASSES = BUILDING.classes
-CAMERA = DepthCamera(width=480, height=320, focal=0.62)  # 78 degrees wide
+CAMERA = DepthCamera(width=432, height=288, focal=0.62)  # 78 degrees wide
 EYE, TARGET = (5.7, 4.6, 1.5), (2.25, 2.0, 0.75)
-VIEW = View.look_at(EYE, TARGET, fov=2 * np.degrees(np.arctan(320 / 480 / 2 / 0.62)), width=960, height=640)
+VIEW = View.look_at(EYE, TARGET, fov=2 * np.degrees(np.arctan(1 / 3 / 0.62)), width=960, height=640)
 HIGH = (9.2, 8.4)  # metres: the corner of the part of the building that is mapped
 COSTS = {"floor": 0, "chair": 50}  # all other classes are lethal
 
@@ -52,7 +53,7 @@ def true_view(origin: Array, rays: Array) -> tuple[Array, NDArray[np.int32]]:
 
 def show_classes(axes: Axes, points: Array, distance: Array, labels: NDArray[np.int32], title: str) -> None:
     met = np.isfinite(distance)
-    size = distance[met] / VIEW.focal * VIEW.width / CAMERA.width
+    size = 1.3 * distance[met] / VIEW.focal * VIEW.width / CAMERA.width
     axes.imshow(splat(points[met], by_class(labels[met], CLASSES), VIEW, size))
     axes.set_title(title)
 
@@ -79,8 +80,8 @@ def main() -> None:
 
     places = BUILDING.reachable(0.3, spacing=0.25)
     places = places[(places < np.array(HIGH) - 0.3).all(axis=1)]
-    places = places[np.random.default_rng(0).permutation(len(places))[:12]]
-    building_map = GPSemanticMap(CLASSES, PRESETS["general"], free=FreeSpace())
+    places = places[np.random.default_rng(1).permutation(len(places))[:12]]
+    building_map = GPSemanticMap(CLASSES, replace(PRESETS["general"], resolution=0.04), free=FreeSpace())
     for i, place in enumerate(places):
         building_map.update(BUILDING.scan(BUILDING.pose(place), i))
 
@@ -90,10 +91,9 @@ def main() -> None:
     distance, labels = true_view(origin, rays)
     hits = raycast(building_map, origin, rays, max_range=12)
     error = np.abs(hits.distance - distance)[hits.met]
-    print(
-        f"{len(hits):,} rays, {hits.met.mean():.1%} of them meet something; {(hits.label == labels).mean():.1%} meet"
-    )
-    print(f"the right class; the median error of the depth is {100 * np.median(error):.1f} cm")
+    right = (hits.label == labels).mean()
+    print(f"{len(hits):,} rays: {hits.met.mean():.1%} meet something, {right:.1%} meet the right class;")
+    print(f"median error of the depth {100 * np.median(error):.1f} cm")
     grid = occupancy_grid(building_map, (0, 0), HIGH, heights=(-0.1, 1.1), resolution=0.05, costs=COSTS)
 
     figure = Figure(figsize=(17, 8.6), layout="constrained")
