@@ -217,13 +217,15 @@ def test_the_surer_of_two_labels_wins() -> None:
         assert (probability[0] > probability[2]) == (confidence[0] > confidence[1])
 
 
-def test_drift_counts_what_labels_count() -> None:
+@pytest.mark.parametrize("soft", [False, True])
+def test_drift_counts_what_labels_count(soft: bool) -> None:
     """See `Sites`: for a label of mass w added to n, (1 - its class's share + 1/2) w / (n + w)."""
     sites, point = Sites(2, 0, EDGE), np.zeros((1, 3))
     expected = 0.0
     for label, w, step in ((0, 0.5, 1.0), (0, 0.25, 0.5 / 3), (1, 0.25, 1.5 / 4), (1, 1.0, (1.5 - 0.25) / 2)):
-        one = np.full(1, label, np.int32)
-        sites.add(point, one, None, featureless(1), np.full(1, w, np.float32))
+        one = None if soft else np.full(1, label, np.int32)
+        weights = np.eye(2, dtype=np.float32)[[label]] if soft else None
+        sites.add(point, one, weights, featureless(1), np.full(1, w, np.float32))
         expected += step
         assert sites.drift[0] == pytest.approx(expected)
 

@@ -44,9 +44,9 @@ def members(kernel: Kernel, X: F32, S: F32, i: int, j: int) -> float:
     sets = [[(row, bit) for row in (3, 4) for bit in range(24) if int(S[row, m]) >> bit & 1] for m in (i, j)]
     if i == j and not sets[0]:
         sets = [[(0, 0)], [(0, 0)]]
-    plain = naive(kernel, X[:, i], X[:, j], np.zeros(3))
+    together = naive(kernel, X[:, i], X[:, j], (np.sqrt(S[:3, i]) - np.sqrt(S[:3, j])) ** 2)
     apart = naive(kernel, X[:, i], X[:, j], S[:3, i] + S[:3, j])
-    pairs = [plain if a == b else apart for a in sets[0] for b in sets[1]]
+    pairs = [together if a == b else apart for a in sets[0] for b in sets[1]]
     return float(np.mean(pairs)) if pairs else apart
 
 

@@ -90,6 +90,7 @@ def near(points: F64, at: ArrayLike, reach: float = 0.4) -> NDArray[np.bool_]:
 def stored(made: GPSemanticMap) -> dict[str, NDArray[Any]]:
     """What is stored, but for cells without sites: queries make some."""
     arrays = dict(made.to_arrays()[1])
+    np.testing.assert_array_equal(arrays["origin"], arrays["free.origin"])
     for prefix in ("", "free."):
         cells, time = arrays.pop(prefix + "cells"), arrays.pop(prefix + "time")
         with_sites = np.isin(cells, cell_keys(arrays[prefix + "voxels"]))
@@ -324,9 +325,12 @@ class TestGone:
         made = updated(new(Forgetting(1e12)), *[dense[0]] * 5, *[dense[1]] * 40)
         assert near(made.positions, self.AT, 0.25).sum() == 0
 
-    @pytest.mark.parametrize(("passed", "weight"), [(0.5, 0.5), (0.8, 0.25), (0.1, 2.0), (1.0, 1.0)])
+    @pytest.mark.parametrize(("passed", "weight"), [(0.5, 0.5), (0.8, 0.25), (0.1, 2.0), (1.0, 1.0), (0.5, 2.5)])
     def test_scan_by_scan(self, passed: float, weight: float) -> None:
-        """What was seen is multiplied; what is mostly free then loses labels; the scan says that it is free."""
+        """What was seen is multiplied; what is mostly free then loses labels; the scan says that it is free.
+
+        The last: after two scans as often seen as passed, which is not mostly free.
+        """
         made = updated(new(Forgetting(1e12, passed=passed), weight=weight), *[scan(0.0)] * 5)
         of_labels, of_space = masses(made), masses(made, "free.")
         table, walk = VoxelTable(), Walk(EDGE, np.zeros(3), 1e9, 0, EDGE, 3 * EDGE, 1, np.inf)
@@ -436,15 +440,15 @@ class TestLongLife:
         made, keeps = new(Forgetting(30.0, passed=0.05)), new(None)
         most = 0
         for i, (height, ahead) in enumerate(way):
+            cloud = scan(height, i % 7, ahead=ahead)
+            cloud = replace(cloud, labels=np.where(cloud.hard_labels == THING, THING, MISSING).astype(np.int32))
             for semantic_map in (made, keeps):
-                semantic_map.update(scan(height, i % 7, ahead=ahead))
+                semantic_map.update(cloud)
             most = max(most, len(made))
-        things = [sum(m[THING] > 64 for m in masses(one).values()) for one in (made, keeps)]
-        live = sum(m[THING] > 0 for m in masses(updated(new(None), scan(0.0, 1))).values())
-        walls = sum(m[WALL] > 0 for m in masses(keeps).values())
-        assert things[1] > 12 * live
-        assert things[0] < 5 * live
-        assert most <= 2 * (walls + 5 * live)
+        live = len(updated(new(None), cloud))
+        assert len(keeps) > 12 * live
+        assert len(made.positions) < 4 * live
+        assert most < 8 * live
         assert near(made.positions, off(SENSOR, way[-1][1], 0, way[-1][0]), 0.36).sum() >= live / 2
 
     def labels_of_the_thing_only(self, thing_at: float | None, seed: int) -> LabelledCloud:
@@ -480,6 +484,53 @@ class TestLongLife:
         assert made.positions.shape == (0, 3)
         x = made.occupied_positions[:, 0] - TestGone.WALL_AT[0]
         assert np.minimum(np.abs(x), np.abs(x - 20)).max() < 1e-6
+        arrays = made.to_arrays()[1]
+        assert arrays["time"][-1] == arrays["free.time"][-1] == 21
+        elsewhere = replace(elsewhere, labels=np.zeros(2500, np.int32))
+        assert len(updated(made, elsewhere).positions) > 0
+        np.testing.assert_array_equal(arrays["free.origin"], made.to_arrays()[1]["origin"])
+
+    @pytest.mark.xfail(reason="a field begun anew forgets where its keys begin", strict=True)
+    def test_all_old_labels_are_forgotten_as_new_ones_come(self) -> None:
+        made = updated(new(Forgetting(1e12, passed=0.01)), *[self.labels_of_the_thing_only(0.0, 3)] * 3)
+        elsewhere = patch((4.0, 20.0, 3.0), (2.0, 20.0, 3.0), 5)
+        gone = self.labels_of_the_thing_only(None, 3)
+        gone = replace(
+            gone,
+            points=np.concatenate([gone.points, elsewhere.points]),
+            labels=np.concatenate([gone.hard_labels, elsewhere.hard_labels]),
+        )
+        for _ in range(6):
+            arrays = updated(made, gone).to_arrays()[1]
+            np.testing.assert_array_equal(arrays["origin"], arrays["free.origin"])
+
+    def test_the_first_point_decides_nothing(self) -> None:
+        """Not even where it lies beyond the reach, in another cell."""
+        clouds = [scan(0.0 if i < 3 else None, i) for i in range(6)]
+        far = patch((60.0, 3.0, 3.0), SENSOR, 5)
+        both = (
+            np.concatenate([far.points, clouds[0].points]),
+            np.concatenate([far.hard_labels, clouds[0].hard_labels]),
+        )
+        first, last = ([replace(clouds[0], points=both[0][s], labels=both[1][s])] for s in (np.s_[:], np.s_[::-1]))
+        a, b = (updated(new(TestGone.QUICK, reach=30.0), *start, *clouds[1:]) for start in (first, last))
+        assert_same_masses(a, b)
+        np.testing.assert_array_equal(a.to_arrays()[1]["origin"], a.to_arrays()[1]["free.origin"])
+
+    @pytest.mark.xfail(reason="stored without sites, a field forgets the time", strict=True)
+    def test_saved_without_labels_and_gone_on_with(self, tmp_path: Path) -> None:
+        clouds = [scan(0.0 if i < 3 else None, i, labels=None) for i in range(5)] + [scan(None, 7)]
+        straight, made = updated(new(Forgetting(3.0)), *clouds), updated(new(Forgetting(3.0)), *clouds[:3])
+        save_map(made, tmp_path / "map.semgp")
+        loaded = load_map(tmp_path / "map.semgp")
+        assert isinstance(loaded, GPSemanticMap)
+        assert_same(updated(loaded, *clouds[3:]), straight)
+
+    @pytest.mark.parametrize(("confidence", "kept"), [(1 / 32, True), (1 / 128, False)])
+    def test_faint_sites_have_no_position(self, confidence: float, kept: bool) -> None:
+        made = updated(new(NEVER), patch((3.0, 1.0, 1.0), (1.0, 1.0, 1.0), 1, confidence=np.full(1, confidence)))
+        assert len(made.positions) == kept
+        assert len(made) == 1
 
     @pytest.mark.parametrize("after", [1, 4, 8])
     @pytest.mark.parametrize("per", ["scan", "second"])
@@ -496,8 +547,8 @@ class TestLongLife:
 
     def test_asked_on_the_way(self) -> None:
         """What fades, and what is given up, is solved again."""
-        clouds = [scan(0.0 if i < 3 else None, i) for i in range(6)]
-        clouds += [patch((5.5, 1.0, 1.0), (5.0, 1.0, 1.0))] * 2  # in the same cell
+        clouds = [scan(0.0), scan(0.0, 1), *[scan(None, i, labels=None) for i in (2, 3, 4)], scan(None, 5)]
+        clouds += [patch((5.5, 1.0, 1.0), (5.0, 1.0, 1.0), labels=None)] * 2  # in the same cell
         made, asked = updated(new(Forgetting(3.0)), *clouds), new(Forgetting(3.0))
         X = SENSOR + np.random.default_rng(1).uniform((-0.5, -2, -2), (4, 2, 2), (2000, 3))
         for cloud in clouds:

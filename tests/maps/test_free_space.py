@@ -164,6 +164,21 @@ class TestOccupancy:
         assert np.abs(depth).max() < 0.1
         assert made.resolution == EDGE
 
+    def test_as_often_passed_as_met(self) -> None:
+        """Such sites are neither free nor occupied."""
+        ends = np.array([[1.55, 0.05, 0.05], [3.05, 0.05, 0.05]])
+        clouds = [LabelledCloud(end[None], SIX, T_world_sensor=pose((0.05, 0.05, 0.05))) for end in ends]
+        made = built(clouds, FreeSpace(weight=1.0, thin=1))
+        ties = [
+            index[0]
+            for index, mass in zip(*(sites_of(made)["free." + n] for n in ("index", "mass")))
+            if mass.all()
+        ]
+        assert ties == [15]
+        np.testing.assert_allclose(made.occupied_positions, ends[1:], atol=1e-8)
+        assert len(made.free_positions) == made.info()["free_sites"] - 2 > 20
+        assert not ((made.free_positions[:, 0] > 1.5) & (made.free_positions[:, 0] < 1.6)).any()
+
     def test_a_map_of_nothing_knows_nothing(self) -> None:
         made = GPSemanticMap(SIX, MODEL, free=FREE_SPACE)
         nothing = made.occupancy(queries(10))
@@ -219,6 +234,12 @@ class TestSamples:
         assert set(map(tuple, rays.points[hit].tolist())) <= set(map(tuple, ended.tolist()))
         assert set(map(tuple, rays.points[~hit].tolist())) <= set(map(tuple, passed.tolist()))
         assert len(rays.passed) == 0
+
+    def test_a_ray_along_nothing_but_ends_frees_nothing(self) -> None:
+        ends = np.column_stack([np.arange(3.0, 0.0, -0.05), np.full((60, 2), 0.05)])
+        rays = self.sampled(LabelledCloud(ends, SIX, T_world_sensor=pose((0.01, 0.05, 0.05))), thin=1)
+        assert len(rays.points) > 25
+        assert (rays.labels == OCCUPIED).all()
 
     def test_beyond_its_reach_a_ray_only_passes(self) -> None:
         ends = np.array([[1.55, 0.05, 0.05], [9.05, 0.05, 3.05]])
@@ -370,6 +391,7 @@ def test_with_a_tolerance_little_changes_are_left_to_later() -> None:
         made.occupancy(queries())
         made.update(clouds[0])
         made.occupancy(queries())
+        made.query(queries())
     assert live.info()["free_cells_to_solve"] > exact.info()["free_cells_to_solve"]
     assert occupancy_of(live.query(queries())).state.tolist() == live.occupancy(queries()).state.tolist()
 
@@ -675,6 +697,8 @@ class TestSettings:
         k = kernel(np.eye(3), np.zeros((1, 3)))[:, 0]
         assert np.argmin(k) == axis
         assert k[axis - 1] == k[axis - 2] == occupancy_model(0.2).kernel(np.eye(3), np.zeros((1, 3)))[0, 0]
+        far = kernel(np.eye(3) * 2.0, np.zeros((1, 3)))[:, 0]
+        assert far[axis] < 0.2 * far[axis - 1]
 
     @pytest.mark.parametrize(
         "free",

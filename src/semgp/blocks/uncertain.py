@@ -8,10 +8,11 @@ it closest to the expectation in three dimensions: at worst .035 of sf^2 away fo
 1/2, over errors up to 2.5 length scales. It is the kernel of Paciorek and Schervish (2004), which is positive
 definite, each point scaled by a factor of its own.
 
-The points of one scan are displaced together: between two of them the kernel is the plain one, and so it is
-between a point and itself. What a site says is the mean over a set of draws, A, and another's over B: their
-covariance is the plain one with the share w = |A and B| / (|A| |B|), and the expected one with the rest. Points to
-be predicted share no draw.
+The points of one scan are displaced together, each by its own standard deviation: along an axis, what two of them
+are displaced against each other has the variance (s_i - s_j)^2 instead of s_i^2 + s_j^2. What a site says is the
+mean over a set of draws, A, and another's over B: the first rule holds for the share w = |A and B| / (|A| |B|) of
+the pairs, the second for the rest. Points to be predicted share no draw. All of this is the covariance of averages
+of one random function, so that it stays positive definite.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def cross_covariance(Z: F32, SZ: F32, n: int, X: F32, SX: F32, m: int, kernel: M
     for j in range(n):
         for d in range(len(SZ)):
             s[d] = SZ[d, j]
-        _expected_row(Z, j, s, X, SX, m, kernel, K[j], work, gain)
+        _expected_row(Z, j, s, X, SX, m, False, kernel, K[j], work, gain)
 
 
 @njit(cache=True, nogil=True)
@@ -54,15 +55,16 @@ def member_covariance(X: F32, S: F32, n: int, kernel: Mixture, K: F32, work: F32
 
     S (5, .) are the variances of their positions and their sets of draws, (0, .) where they are certain.
     """
-    covariance_lower(X, n, kernel, K, work)
     if len(S) == 0:
+        covariance_lower(X, n, kernel, K, work)
         return
-    gain, expected = np.empty(n, np.float32), np.empty(n, np.float32)
+    gain, together = np.empty(n, np.float32), np.empty(n, np.float32)
     size = _set_sizes(S, n)
     for j in range(n):
-        _expected_row(X, j, S[:, j], X, S, j + 1, kernel, expected, work, gain)
+        _expected_row(X, j, S[:, j], X, S, j + 1, False, kernel, K[j], work, gain)
+        _expected_row(X, j, S[:, j], X, S, j + 1, True, kernel, together, work, gain)
         for q in range(j + 1):
-            K[j, q] = expected[q] + _shared(S, size, j, q) * (K[j, q] - expected[q])
+            K[j, q] += _shared(S, size, j, q) * (together[q] - K[j, q])
 
 
 @njit(cache=True, nogil=True)
@@ -77,7 +79,7 @@ def cross_derivative(
     for j in range(n):
         for d in range(len(SZ)):
             s[d] = SZ[d, j]
-        _expected_derivative(Z, j, s, X, SX, m, kernel, H[j], sign, out)
+        _expected_derivative(Z, j, s, X, SX, m, False, kernel, H[j], sign, out)
 
 
 @njit(cache=True, nogil=True)
@@ -86,13 +88,13 @@ def member_derivative(X: F32, S: F32, n: int, kernel: Mixture, H: F32, sign: flo
     if len(S) == 0:
         derivative_tile(X, n, X, n, kernel, H, sign, out, work)
         return
-    size, plain, expected = _set_sizes(S, n), np.empty((n, n), np.float32), np.empty(n, np.float32)
+    size, apart, together = _set_sizes(S, n), np.empty(n, np.float32), np.empty(n, np.float32)
     for j in range(n):
         for q in range(n):
-            plain[j, q] = _shared(S, size, j, q) * H[j, q]
-            expected[q] = H[j, q] - plain[j, q]
-        _expected_derivative(X, j, S[:, j], X, S, n, kernel, expected, sign, out)
-    derivative_tile(X, n, X, n, kernel, plain, sign, out, work)
+            together[q] = _shared(S, size, j, q) * H[j, q]
+            apart[q] = H[j, q] - together[q]
+        _expected_derivative(X, j, S[:, j], X, S, n, False, kernel, apart, sign, out)
+        _expected_derivative(X, j, S[:, j], X, S, n, True, kernel, together, sign, out)
 
 
 @njit(cache=True, nogil=True)
@@ -123,7 +125,17 @@ def _ones(word: np.uint32) -> int:
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _expected_row(
-    Z: F32, j: int, s: F32, X: F32, SX: F32, m: int, kernel: Mixture, row: F32, work: F32, gain: F32
+    Z: F32,
+    j: int,
+    s: F32,
+    X: F32,
+    SX: F32,
+    m: int,
+    together: bool,
+    kernel: Mixture,
+    row: F32,
+    work: F32,
+    gain: F32,
 ) -> None:
     kind, weight, variance = kernel
     for q in range(m):
@@ -142,8 +154,10 @@ def _expected_row(
                     gain[q] *= g
             else:
                 sd, sx = s[d], SX[d]
+                # what points displaced together do not share
+                less = np.float32(2) * np.sqrt(sd) if together else np.float32(0)
                 for q in range(m):
-                    g = _ONE / (_ONE + (sd + sx[q]) * wd * per)
+                    g = _ONE / (_ONE + (sd + sx[q] - less * np.sqrt(sx[q])) * wd * per)
                     difference = x[q] - z
                     work[q] += wd * g * difference * difference
                     gain[q] *= g
@@ -167,7 +181,7 @@ def _expected_row(
 
 @njit(cache=True, nogil=True)
 def _expected_derivative(
-    Z: F32, j: int, s: F32, X: F32, SX: F32, m: int, kernel: Mixture, h: F32, sign: float, out: F64
+    Z: F32, j: int, s: F32, X: F32, SX: F32, m: int, together: bool, kernel: Mixture, h: F32, sign: float, out: F64
 ) -> None:
     """One row of the derivatives."""
     kind, weight, variance = kernel
@@ -180,7 +194,8 @@ def _expected_derivative(
             for d in range(D):
                 sd = np.float32(0)
                 if d < 3:
-                    sd = s[d] + (SX[d, q] if len(SX) else np.float32(0))
+                    sx = SX[d, q] if len(SX) else np.float32(0)
+                    sd = (np.sqrt(s[d]) - np.sqrt(sx)) ** 2 if together else s[d] + sx
                 g[d] = _ONE / (_ONE + sd * weight[k, d] * per)
                 r2 += weight[k, d] * g[d] * (X[d, q] - Z[d, j]) ** 2
                 gain *= g[d]
