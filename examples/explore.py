@@ -9,9 +9,9 @@ sensor and number of scans, in the same buildings.
 
 Above: how much of the surfaces that can be seen is known, over metres driven and over scans, and how uncertain the
 map is on average about what is free, over metres (random goals drive on beyond the axis). Thick lines are means
-over the buildings, thin ones single buildings. Below: what each robot has mapped of the first building, from above,
-in the colours of the classes; grey is unknown, thin lines are the true rooms. The way leads from the star to the
-circle, with a dot for each scan. Information tells most for each scan; frontiers, one after the other, save way.
+over the buildings, thin ones single buildings. Below: what each robot has mapped of the first building, seen from
+above, in the colours of the classes; grey is unknown, thin lines are the true rooms. The way leads from the star
+to the circle, with a dot for each scan. Information tells most for each scan; small steps to frontiers save way.
 """
 
 import argparse
@@ -249,7 +249,7 @@ def draw(runs: dict[str, list[Robot]], out: Path) -> None:
     top = [figure.add_subplot(2, 3, i + 1) for i in range(3)]
     curves(top[0], runs, 0, 1, "surfaces known, by way driven")
     curves(top[1], runs, None, 1, "surfaces known, by scans")
-    curves(top[2], runs, 0, 4, "entropy of free or occupied: mean over the building, nats")
+    curves(top[2], runs, 0, 4, "mean entropy of free or occupied, nats")
     top[1].legend(loc="lower right", framealpha=0.9)
     for axes in top[:2]:
         axes.set_ylim(0, 1)

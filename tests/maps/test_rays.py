@@ -293,7 +293,6 @@ def test_nothing_watched_of_many() -> None:
     np.testing.assert_array_equal(again_keys, keys)
 
 
-@pytest.mark.xfail(reason="0.3 / 0.1 rounds to below 3, and to 3 once the origin is taken off", strict=True)
 @pytest.mark.parametrize(("height", "edge"), [(0.3, 0.1), (1.2, 0.2), (0.15, 0.05)])
 def test_a_level_lidar_on_a_face_between_voxels(height: float, edge: float) -> None:
     """All its samples, and all its points, lie where rounding decides: it must decide alike."""
@@ -306,7 +305,6 @@ def test_a_level_lidar_on_a_face_between_voxels(height: float, edge: float) -> N
     np.testing.assert_array_equal(keys[inner], voxel_keys(samples, edge, w.origin)[inner])
 
 
-@pytest.mark.xfail(reason="places are rounded after the origin is taken off", strict=True)
 def test_rounding_does_not_depend_on_the_origin() -> None:
     sensor = np.array([0.5, 0.5, 5 - 3 * 2.0**-35])
     point = sensor + np.array([[20.0, 0, 0]])

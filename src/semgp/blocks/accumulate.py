@@ -140,8 +140,9 @@ def _fade(r: int, factor: float, mass: U32, place: I64, spread: I64) -> None:
     """Multiply the mass of a site by a factor, its place and variance left as they are; one step of mass stays."""
     before, after, top = np.int64(0), np.int64(0), 0
     for c in range(mass.shape[1]):
-        before += np.int64(mass[r, c])
         top = c if mass[r, c] > mass[r, top] else top
+    for c in range(mass.shape[1]):
+        before += np.int64(mass[r, c])
         mass[r, c] = np.uint32(np.rint(mass[r, c] * factor))
         after += np.int64(mass[r, c])
     if after == 0:

@@ -35,6 +35,22 @@ class Observations(NamedTuple):
     draws: I64 | None = None
 
 
+def require_summable(given: Observations) -> None:
+    """Raise InputError for weights, features or variances beyond what a sum can hold."""
+    weights, features, variances = given.weights, given.features, given.variances
+    if not len(given.points):
+        return
+    if variances is not None and variances.max() > _LARGEST_VARIANCE:
+        raise InputError(
+            f"positions must be known to {math.sqrt(_LARGEST_VARIANCE):g} m, a variance of "
+            f"{_LARGEST_VARIANCE} m^2: drop points that are less certain."
+        )
+    if weights is not None and weights.max() > _LARGEST_WEIGHT:
+        raise InputError(f"weights of soft labels must be {_LARGEST_WEIGHT} at most: divide them.")
+    if np.abs(features).max(initial=0) > _LARGEST_FEATURE:
+        raise InputError(f"features must lie within {_LARGEST_FEATURE} of 0: scale them.")
+
+
 def counted(given: Observations) -> tuple[Observations, I64]:
     """Return the observations that count, and the mass of each (N,) in steps of 1 / `MASS_UNIT`.
 
@@ -47,15 +63,7 @@ def counted(given: Observations) -> tuple[Observations, I64]:
     amounts = np.full(len(points), MASS_UNIT)
     if not len(points):
         return given, amounts
-    if variances is not None and variances.max() > _LARGEST_VARIANCE:
-        raise InputError(
-            f"positions must be known to {math.sqrt(_LARGEST_VARIANCE):g} m, a variance of "
-            f"{_LARGEST_VARIANCE} m^2: drop points that are less certain."
-        )
-    if weights is not None and weights.max() > _LARGEST_WEIGHT:
-        raise InputError(f"weights of soft labels must be {_LARGEST_WEIGHT} at most: divide them.")
-    if np.abs(features).max(initial=0) > _LARGEST_FEATURE:
-        raise InputError(f"features must lie within {_LARGEST_FEATURE} of 0: scale them.")
+    require_summable(given)
     if confidence is not None:
         amounts = np.rint(confidence * MASS_UNIT).astype(np.int64)
     heavy = amounts > 0

@@ -30,6 +30,9 @@ CELL_BITS = 6
 CELL = 1 << CELL_BITS
 """Voxels along the edge of a cell."""
 
+LEAST_FADED = 0.98
+"""The factor from which on a cell fades."""
+
 
 class Sites:
     """Class mass, position and features of each voxel with labels, and the cells that the voxels lie in.
@@ -166,8 +169,12 @@ class Sites:
         return np.flatnonzero(touched).astype(np.int32)
 
     def fade(self, cells: I64, half_life: float) -> None:
-        """Let the sites of some cells lose half their mass for each half-life since the cells were last faded."""
+        """Let the sites of some cells lose half their mass for each half-life since the cells were last faded.
+
+        Less than `LEAST_FADED` waits for the next time: in many small steps rounding would stop what is light.
+        """
         factors = 0.5 ** ((self.clock - self.time[cells]) / half_life)
+        cells, factors = cells[factors <= LEAST_FADED], factors[factors <= LEAST_FADED]
         fade_cells(cells, factors, self._head, self._next, self._mass, self._place, self._spread)
         self.time[cells] = self.clock
 
@@ -227,6 +234,8 @@ class Sites:
         keys = arrays["voxels"]
         if len(np.unique(keys)) != len(keys):
             raise InputError("the stored sites are damaged: a voxel occurs twice.")
+        if "time" in arrays:
+            self._restore_times(arrays["cells"], arrays["time"])
         if not len(keys):
             return
         total = arrays["mass"].sum(axis=1, dtype=np.int64)
@@ -246,9 +255,16 @@ class Sites:
         if "spread" in arrays:
             self._spread = arrays["spread"].copy()
         self._link(0)
-        if "time" in arrays:
-            cells = self.cell_ids(arrays["cells"])
-            self.time[cells], self.clock = arrays["time"][:-1], float(arrays["time"][-1])
+
+    def _restore_times(self, cells: I64, times: F64) -> None:
+        """Take in when cells were last faded, the clock last."""
+        if not np.isfinite(times).all() or (times > times[-1]).any():
+            raise InputError("the stored sites are damaged: a time is not finite, or later than the clock.")
+        if len(np.unique(cells)) != len(cells) or (cell_keys(cells) != cells).any() or (cells < 0).any():
+            raise InputError("the stored sites are damaged: the cells that have times are none.")
+        self.clock = float(times[-1])
+        ids = self.cell_ids(cells)
+        self.time[ids] = times[:-1]
 
 
 def cell_origin(points: F64, resolution: float) -> I64:

@@ -8,16 +8,18 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from semgp.blocks.arrays import I64
 from semgp.blocks.field import Field
 from semgp.blocks.inputs import cloud_inputs
 from semgp.blocks.model import BlockModel
+from semgp.blocks.observations import require_summable
 from semgp.blocks.sites import CELL, cell_origin
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.forgetting import Forgetting, faint
 from semgp.maps.free_space import FreeSpace
-from semgp.maps.occupancy import Occupancy, Rays
+from semgp.maps.occupancy import Occupancy
 from semgp.maps.settings import require_data, stored_array
 from semgp.prediction import Prediction
 from semgp.voxels import voxel_keys
@@ -77,31 +79,36 @@ class ManyBlocks:
         if self.occupancy is None or not len(cloud):
             self._field.add(*inputs)
             return
-        now = 0.0 if self.forgetting is None else self.forgetting.clock(cloud, self._field.sites.clock)
-        rays = self.occupancy.sample(cloud, watch=self.forgetting is not None)
-        self._share_origin(cloud)
-        if self.forgetting is not None:
-            self._forget(self.forgetting, rays, now)
+        require_summable(inputs)
+        origin, forgetting, watched = self._origin(cloud), self.forgetting, np.empty(0, dtype=bool)
+        sites, now = self._field.sites, 0.0
+        if forgetting is not None:
+            begun = any(field.sites.origin is not None for field in self._fields.values())
+            now = forgetting.clock(cloud, sites.clock if begun else None)
+            watched = self.occupancy.occupied(sites.voxels.keys[~faint(sites)])
+        rays = self.occupancy.sample(cloud, origin, watched)
+        for field in self._fields.values():
+            field.sites.origin = origin
+        if forgetting is not None:
+            self._forget(forgetting, np.concatenate([rays.points, inputs.points]), rays.passed, now)
         self._field.add(*inputs)
         self.occupancy.add(rays)
 
-    def _share_origin(self, cloud: LabelledCloud) -> None:
-        """Have the keys of both fields begin at one voxel: passed voxels are found in both."""
+    def _origin(self, cloud: LabelledCloud) -> I64:
+        """Where the keys of all fields begin: passed voxels are found in each."""
         known = [field.sites.origin for field in self._fields.values() if field.sites.origin is not None]
-        origin = known[0] if known else cell_origin(cloud.points, self.model.resolution)
-        for field in self._fields.values():
-            field.sites.origin = origin
+        return known[0] if known else cell_origin(cloud.points, self.model.resolution)
 
-    def _forget(self, forgetting: Forgetting, rays: Rays, now: float) -> None:
-        """Fade what a cloud's rays come near, and what they pass through."""
-        assert self.occupancy is not None
+    def _forget(self, forgetting: Forgetting, points: NDArray[np.float64], passed: I64, now: float) -> None:
+        """Fade what a cloud comes near, and what its rays pass through."""
         origin = self._field.sites.origin
+        assert self.occupancy is not None
         assert origin is not None
-        keys = voxel_keys(rays.points, self.model.resolution, origin)
+        keys = voxel_keys(points, self.model.resolution, origin)
         for field in self._fields.values():
             forgetting.fade(field, keys, now)
-        forgetting.give_up(self.occupancy.field, rays.passed)
-        forgetting.give_up(self._field, self.occupancy.mostly_free(rays.passed))
+        forgetting.give_up(self.occupancy.field, passed)
+        forgetting.give_up(self._field, self.occupancy.mostly_free(passed))
         self._drop_faint()
 
     def _drop_faint(self) -> None:
@@ -115,6 +122,7 @@ class ManyBlocks:
         """Begin a field anew with stored sites."""
         field = Field(self._fields[prefix].model, 2 if prefix else len(self.classes))
         field.restore(arrays)
+        field.sites.origin = self._fields[prefix].sites.origin
         if self.occupancy is not None and prefix:
             self.occupancy.field = field
         else:
@@ -204,6 +212,9 @@ class ManyBlocks:
         )
         for prefix, field in made._fields.items():
             field.restore(_stored_sites(arrays, prefix, field))
+        origins = [f.sites.origin for f in made._fields.values() if f.sites.origin is not None]
+        if any((origin != origins[0]).any() for origin in origins):
+            raise InputError("the stored fields of labels and of free space do not begin at one voxel: damaged.")
         return made
 
     @property

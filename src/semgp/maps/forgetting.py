@@ -49,14 +49,15 @@ class Forgetting:
     passed: float = 0.5
 
     def __post_init__(self) -> None:
-        require_positive("half_life", self.half_life)
+        object.__setattr__(self, "half_life", require_positive("half_life", self.half_life))
         if self.per not in ("scan", "second"):
             raise InputError(f"a half-life is counted per 'scan' or per 'second', not {self.per!r}.")
         if not 0 < self.passed <= 1:
             raise InputError(f"passed is the share that stays, above 0 and at most 1, not {self.passed}.")
+        object.__setattr__(self, "passed", float(self.passed))
 
-    def clock(self, cloud: LabelledCloud, before: float) -> float:
-        """Return the time of a cloud, given that of the one before.
+    def clock(self, cloud: LabelledCloud, before: float | None) -> float:
+        """Return the time of a cloud, given that of the one before, or None for the first one.
 
         Raises
         ------
@@ -64,10 +65,10 @@ class Forgetting:
             Seconds without a stamp, or a stamp that lies before the last one.
         """
         if self.per == "scan":
-            return before + 1
+            return (before or 0.0) + 1
         if cloud.stamp is None:
             raise InputError("a half-life in seconds needs a stamp for each cloud: give one, or count scans.")
-        if cloud.stamp < before:
+        if before is not None and cloud.stamp < before:
             raise InputError(f"the cloud of {cloud.stamp} s comes after one of {before} s: update in their order.")
         return cloud.stamp
 

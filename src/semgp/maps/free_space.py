@@ -6,10 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from semgp.blocks.model import BlockModel
 from semgp.errors import InputError
 from semgp.gp.stationary import Matern52
 from semgp.maps.settings import require_positive
+
+_MOST = 1 << 31  # rays, and voxels of which one counts
 
 
 def occupancy_model(resolution: float, vertical: int | None = None) -> BlockModel:
@@ -79,11 +83,17 @@ class FreeSpace:
     def __post_init__(self) -> None:
         for name in ("weight", "margin", "near", "reach"):
             if name != "reach" or self.reach is not None:
-                require_positive(name, getattr(self, name))
-        if not all(isinstance(v, int) and v >= 1 for v in (self.rays, self.thin)):
-            raise InputError("rays and thin are whole numbers, 1 or more.")
-        if not isinstance(self.seed, int) or self.seed < 0:
-            raise InputError(f"the seed is a whole number, 0 or above, not {self.seed!r}.")
+                object.__setattr__(self, name, require_positive(name, getattr(self, name)))
+        if not 1e-3 <= self.weight <= 64:
+            raise InputError(f"the weight of a sample is that of 0.001 to 64 ends of rays, not {self.weight}.")
+        for name in ("rays", "thin", "seed"):
+            value = getattr(self, name)
+            if isinstance(value, np.integer):
+                object.__setattr__(self, name, int(value))
+        if not all(isinstance(v, int) and 1 <= v <= _MOST for v in (self.rays, self.thin)):
+            raise InputError(f"rays and thin are whole numbers, 1 to {_MOST:,}.")
+        if not isinstance(self.seed, int) or not 0 <= self.seed < 1 << 63:
+            raise InputError(f"the seed is a whole number of 63 bits, 0 or above, not {self.seed!r}.")
 
     def of_resolution(self, resolution: float) -> FreeSpace:
         """Return the same with its model for a map of this resolution filled in.

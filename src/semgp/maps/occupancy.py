@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from semgp.blocks.arrays import F64, I32, I64
+from semgp.blocks.arrays import F64, I32, I64, Bool
 from semgp.blocks.field import Field
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.rays import Walk, free_samples
 from semgp.prediction import OccupancyPrediction
-from semgp.voxels import VoxelTable, voxel_keys, voxel_origin
+from semgp.voxels import VoxelTable, voxel_keys
 
 FREE, OCCUPIED = 0, 1
 """The classes of the field."""
@@ -57,10 +57,17 @@ class Occupancy:
         nothing = np.empty((len(rays.points), 0), dtype=np.float32)
         self.field.add(rays.points, rays.labels, None, nothing, confidence)
 
-    def sample(self, cloud: LabelledCloud, watch: bool = False) -> Rays:
+    def sample(self, cloud: LabelledCloud, origin: I64, watched: Bool) -> Rays:
         """Return the points of a cloud, as occupied, and samples along its rays, as free.
 
-        With `watch`, every sample in a voxel that is occupied so far counts, and what was passed is told.
+        Parameters
+        ----------
+        cloud : LabelledCloud
+            With a pose.
+        origin : (3,) array
+            The voxel where the keys of the map begin.
+        watched : (S,) array
+            Sites; every sample in their voxels counts, and it is told which of them were passed. May be empty.
 
         Raises
         ------
@@ -70,13 +77,9 @@ class Occupancy:
         sensor, free, resolution = cloud.origin, self.free, self.model.resolution
         if sensor is None:
             raise InputError("the cloud has no T_world_sensor, and rays begin at the sensor: give its pose.")
-        if not len(cloud):
-            return Rays(np.empty((0, 3)), np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64))
         sites = self.field.sites
-        origin = voxel_origin(sensor[None], resolution) if sites.origin is None else sites.origin
-        voxel_keys(
-            sensor[None], resolution, origin
-        )  # samples lie between sensor and points: both must be in range
+        for ends in (sensor[None], cloud.points):  # samples lie between them: both must be in range
+            voxel_keys(ends, resolution, origin)
         reach = np.inf if free.reach is None else free.reach
         hits = cloud.points
         if free.reach is not None:
@@ -85,7 +88,6 @@ class Occupancy:
             resolution, origin.astype(np.float64), free.rays / len(cloud), free.seed, free.margin * resolution,
             free.near * resolution, free.thin, reach,
         )  # fmt: skip
-        watched = sites.mass[:, OCCUPIED] > 0 if watch else np.empty(0, dtype=bool)
         samples, keys, passed = free_samples(sensor, cloud.points, walk, sites.voxels, watched)
         table = VoxelTable()
         at_hits = _first(table, voxel_keys(hits, resolution, origin))
@@ -101,6 +103,13 @@ class Occupancy:
         answers = self.field.query(X, np.empty((len(X), 0), dtype=np.float32), tolerance)
         known = answers.variance < KNOWN * self.field.prior_variance
         return OccupancyPrediction(answers.probability[:, OCCUPIED], known)
+
+    def occupied(self, also: I64) -> Bool:
+        """Return which sites (S,) rays have ended in, or whose voxels have one of these keys."""
+        found = self.field.sites.mass[:, OCCUPIED] > 0
+        rows = self.field.sites.voxels.find(also)
+        found[rows[rows >= 0]] = True
+        return np.asarray(found)
 
     def mostly_free(self, keys: I64) -> I64:
         """Return those of the keys of voxels whose sightings say free rather than occupied."""

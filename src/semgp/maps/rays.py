@@ -83,9 +83,9 @@ def _along(
     """Step from `begin`, metres from the sensor, towards it; the first `near` samples count wherever they are."""
     most = np.uint64(2.0**24 / walk.thin)
     # places in voxels, with 32 bits after the point: a step is three additions
-    x = _fixed((sensor[0] + begin * d[0]) / walk.resolution - walk.origin[0] + HALF_RANGE)
-    y = _fixed((sensor[1] + begin * d[1]) / walk.resolution - walk.origin[1] + HALF_RANGE)
-    z = _fixed((sensor[2] + begin * d[2]) / walk.resolution - walk.origin[2] + HALF_RANGE)
+    x = _placed((sensor[0] + begin * d[0]) / walk.resolution, walk.origin[0])
+    y = _placed((sensor[1] + begin * d[1]) / walk.resolution, walk.origin[1])
+    z = _placed((sensor[2] + begin * d[2]) / walk.resolution, walk.origin[2])
     # what makes keys those of the world's voxels: which of them count does not depend on where the map began
     world = np.int64(walk.origin[0]) * STEP[0] + np.int64(walk.origin[1]) * STEP[1] + np.int64(walk.origin[2])
     step_x, step_y, step_z = _fixed(d[0]), _fixed(d[1]), _fixed(d[2])
@@ -98,11 +98,12 @@ def _along(
                 passed[row] = matters = True
         if matters:
             t = begin - k * walk.resolution
-            samples[n, 0], samples[n, 1], samples[n, 2] = (
-                sensor[0] + t * d[0],
-                sensor[1] + t * d[1],
-                sensor[2] + t * d[2],
-            )
+            key = np.int64(0)
+            for axis in range(3):
+                place = sensor[axis] + t * d[axis]
+                samples[n, axis] = place
+                voxel = np.int64(np.floor(place / walk.resolution) - walk.origin[axis]) + HALF_RANGE
+                key = (key << AXIS_BITS) | voxel  # rounded as those of points are
             keys[n] = key
             n += 1
         x, y, z = x - step_x, y - step_y, z - step_z
@@ -111,7 +112,15 @@ def _along(
 
 @njit(cache=True, nogil=True, inline="always")
 def _fixed(v: float) -> np.int64:
-    return np.int64(np.floor(v * 4294967296.0))
+    return np.int64(np.rint(v * 4294967296.0))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _placed(v: float, origin: float) -> np.int64:
+    """A place in voxels, rounded down before the origin is taken off, as `semgp.voxels.voxel_keys` does."""
+    voxel = np.floor(v)
+    within = min(_fixed(v - voxel), np.int64((1 << 32) - 1))
+    return (np.int64(voxel - origin) + HALF_RANGE) * np.int64(1 << 32) + within
 
 
 @njit(cache=True, nogil=True, inline="always")

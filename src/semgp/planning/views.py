@@ -65,12 +65,12 @@ def information_gain(
 ) -> InformationGain:
     """Return how much a scan from each pose is expected to tell.
 
-    A ray meets voxels 1, 2 ... of occupancies p_1, p_2 ... (one half where unknown), and reaches the j-th with
-    probability r_j = (1 - p_1) ... (1 - p_{j-1}). Of free or occupied it tells there what a binary symmetric
-    channel of error e does, I_o = H(p (1 - e) + (1 - p) e) - H(e); and of the class, if something is there, what
-    a C-ary symmetric channel of error e_c does, I_c = H(q) - H(1 - e_c, e_c / (C - 1), ...), where q is how
-    likely the sensor gives each label. The gain is the sum of r_j (I_o + p_j I_c) over all voxels, each with its
-    greatest r_j among the rays of the view.
+    A ray meets voxels 1, 2 ... of occupancies p_1, p_2 ... (the map's guess where unknown), and reaches the j-th
+    with probability r_j = (1 - p_1) ... (1 - p_{j-1}). Of free or occupied it tells there what a binary symmetric
+    channel of error e does, I_o = H(p (1 - e) + (1 - p) e) - H(e); and of the class, if something is there, what a
+    C-ary symmetric channel of error e_c does, I_c = H(q) - H(1 - e_c, e_c / (C - 1), ...), where q is how likely
+    the sensor gives each label. The gain is the sum of r_j (I_o + p_j I_c) over all voxels, each with its greatest
+    r_j among the rays of the view.
 
     This is an approximation: voxels are independent given the map, a ray tells of each voxel that it reaches by
     itself, rays without a return tell nothing of what lies beyond the range, and several looks at a voxel tell no
@@ -135,7 +135,7 @@ class _Voxels:
         p, told = np.empty(len(centres)), np.empty((len(centres), 2))
         for part, prediction in answers(self._map, centres):
             occupancy = occupancy_of(prediction)
-            p[part] = np.where(occupancy.known, occupancy.probability, 0.5)
+            p[part] = occupancy.probability
             told[part, 0] = occupancy_information(p[part], self._errors[0])
             told[part, 1] = p[part] * class_information(prediction.probability, self._errors[1])
         self.p, self.told = np.concatenate([self.p, p]), np.concatenate([self.told, told])

@@ -135,7 +135,7 @@ def learn_confusion(
     Parameters
     ----------
     scans : sequence of LabelledCloud
-        Two or more that overlap; their confidence, if any, weighs the labels.
+        Two or more that overlap; their confidence, if any, weighs the labels of a scan in one voxel.
     resolution : float, optional
         Edge of the voxels in metres.
     iterations : int, optional
