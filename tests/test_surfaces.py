@@ -499,9 +499,10 @@ class TestRefusals:
         silent = solid(ball, 1.1)
         silent.query = lambda X: Prediction(TWO, np.full((len(X), 2), 0.5), np.ones(len(X), bool))  # type: ignore
         other: Any = object()
-        for semantic_map in (unseen, plain, silent, other):
+        cases = ((unseen, "occupied"), (plain, "occupied"), (silent, TWO.names[0]), (other, "occupied"))
+        for semantic_map, what in cases:
             with pytest.raises(InputError, match=r"no free space.*free=FreeSpace\(\)"):
-                surface(semantic_map, resolution=0.1)
+                surface(semantic_map, what, resolution=0.1)
 
     @needs_extra
     def test_a_grid_too_large_says_what_fits(self, monkeypatch: pytest.MonkeyPatch) -> None:

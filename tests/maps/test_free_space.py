@@ -503,8 +503,8 @@ def test_the_reach_may_be_a_whole_number() -> None:
 class TestRefused:
     """Updates that are refused leave a map as it was, new or not."""
 
-    def untouched(self, cloud: LabelledCloud, message: str, began: bool) -> None:
-        made = GPSemanticMap(SIX, MODEL, free=FREE_SPACE)
+    def untouched(self, cloud: LabelledCloud, message: str, began: bool, **settings: Any) -> None:
+        made = GPSemanticMap(SIX, MODEL, free=FreeSpace(**settings))
         if began:
             made.update(scan(PLACES[0], 0))
             made.solve()
@@ -527,6 +527,13 @@ class TestRefused:
         points = cloud.points.copy()
         points[17, 0] += 2e5
         self.untouched(replace(cloud, points=points), "drop stray points", began)
+
+    @pytest.mark.parametrize("began", [False, True])
+    def test_stray_labels_beyond_the_reach(self, began: bool) -> None:
+        cloud = scan(PLACES[1], 1)
+        points, labels = cloud.points.copy(), cloud.hard_labels.copy()
+        points[17, 0], labels[17] = 2e5, 0
+        self.untouched(replace(cloud, points=points, labels=labels), "drop stray points", began, reach=6.0)
 
     @pytest.mark.parametrize("began", [False, True])
     def test_stray_sensors(self, began: bool) -> None:
@@ -559,10 +566,7 @@ class TestRefused:
     def test_stray_sensors_of_a_map_that_began(self) -> None:
         self.untouched(scan(PLACES[1], 1, T_world_sensor=pose((1e300, 0, 0))), "away from where the map", True)
 
-    @pytest.mark.parametrize(
-        "began",
-        [False, True],
-    )
+    @pytest.mark.parametrize("began", [False, True])
     def test_heavy_labels(self, began: bool) -> None:
         heavy = np.full((800, 6), 65.0)
         self.untouched(scan(PLACES[1], 1, labels=None, weights=heavy), "64 at most", began)
