@@ -299,10 +299,11 @@ def test_a_level_lidar_on_a_face_between_voxels(height: float, edge: float) -> N
     a = np.linspace(0, 6, 50)
     points = np.column_stack([4 * np.cos(a), 4 * np.sin(a), np.full(50, height)])
     points[::2, 2] = np.nextafter(height, 0)  # a hair off level
-    w = walk(resolution=edge)
-    samples, keys = sampled(np.array([0.013, 0.027, height]), points, w)
-    inner = off_faces(samples + np.array([0, 0, edge / 2]), edge)
-    np.testing.assert_array_equal(keys[inner], voxel_keys(samples, edge, w.origin)[inner])
+    for origin in (np.zeros(3), np.array([-640.0, 128.0, 64.0])):
+        w = walk(resolution=edge, origin=origin)
+        samples, keys = sampled(np.array([0.013, 0.027, height]), points, w)
+        inner = off_faces(samples + np.array([0, 0, edge / 2]), edge)
+        np.testing.assert_array_equal(keys[inner], voxel_keys(samples, edge, w.origin)[inner])
 
 
 def test_rounding_does_not_depend_on_the_origin() -> None:
