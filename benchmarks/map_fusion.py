@@ -11,7 +11,6 @@ and "occupied" is the share of the points, all of them on surfaces, of which a m
 """
 
 import sys
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgp.cloud import LabelledCloud
+from semgp.evaluation.displaced import moved
 from semgp.evaluation.measure import timed
 from semgp.evaluation.scores import score
 from semgp.evaluation.semantic_kitti import VERTICAL, kitti_sequence, kitti_task
@@ -42,13 +42,6 @@ def built(scans: list[LabelledCloud]) -> GPSemanticMap:
     for cloud in scans:
         gp.update(cloud)
     return gp
-
-
-def elsewhere(cloud: LabelledCloud, T_a_b: NDArray[np.float64]) -> LabelledCloud:
-    """Return a cloud of frame a in frame b."""
-    T = np.linalg.inv(T_a_b)
-    assert cloud.T_world_sensor is not None
-    return replace(cloud, points=cloud.points @ T[:3, :3].T + T[:3, 3], T_world_sensor=T @ cloud.T_world_sensor)
 
 
 def frame() -> NDArray[np.float64]:
@@ -90,9 +83,10 @@ def main(folder: Path) -> None:
             flush=True,
         )
 
-    everywhere, turned = truth.points, [elsewhere(cloud, T_a_b) for cloud in scans]
+    T_b_a: NDArray[np.float64] = np.asarray(np.linalg.inv(T_a_b), dtype=np.float64)
+    everywhere, turned = truth.points, [moved(cloud, T_b_a) for cloud in scans]
     row("all scans", *timed(partial(built, scans)), everywhere)
-    row("all scans, turned", *timed(partial(built, turned)), elsewhere(truth, T_a_b).points)
+    row("all scans, turned", *timed(partial(built, turned)), moved(truth, T_b_a).points)
     n = len(scans) // 2
     for halves, first, second in (
         ("every other", slice(None, None, 2), slice(1, None, 2)),

@@ -14,10 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from semgp.blocks.learning import learn_from_scans
-from semgp.cloud import LabelledCloud
+from semgp.evaluation.displaced import displaced
 from semgp.evaluation.scores import Scores, score
 from semgp.evaluation.semantic_kitti import START, VERTICAL, kitti_sequence, kitti_task
 from semgp.maps.gp import GPSemanticMap
@@ -25,21 +24,6 @@ from semgp.maps.presets import OUTDOOR_LIDAR, with_vertical
 
 LEVELS = ((0.1, 0.2), (0.2, 0.4), (0.3, 0.6), (0.5, 1.0))
 """Standard deviations of the errors: metres and degrees, along and about each axis."""
-
-
-def displaced(cloud: LabelledCloud, metres: float, degrees: float, rng: np.random.Generator) -> LabelledCloud:
-    """Return a scan as a wrong pose places it, with the covariance of the error."""
-    assert cloud.T_world_sensor is not None
-    error = np.eye(4)
-    error[:3, :3] = Rotation.from_rotvec(np.radians(degrees) * rng.normal(size=3)).as_matrix()
-    t = cloud.T_world_sensor[:3, 3]
-    error[:3, 3] = t - error[:3, :3] @ t + metres * rng.normal(size=3)
-    return replace(
-        cloud,
-        points=cloud.points @ error[:3, :3].T + error[:3, 3],
-        T_world_sensor=error @ cloud.T_world_sensor,
-        pose_covariance=np.diag([metres**2] * 3 + [np.radians(degrees) ** 2] * 3),
-    )
 
 
 def main(folder: Path, seeds: Sequence[int]) -> None:

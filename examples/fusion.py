@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgp.cloud import LabelledCloud
+from semgp.evaluation.displaced import moved
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.fusion import fuse
 from semgp.maps.gp import GPSemanticMap
@@ -40,11 +41,6 @@ def frame_of_b() -> Array:
     T[:3, :3] = Rotation.from_euler("z", 35, degrees=True).as_matrix()
     T[:3, 3] = 16.0, 1.0, 0.0
     return T
-
-
-def moved(cloud: LabelledCloud, T: Array) -> LabelledCloud:
-    assert cloud.T_world_sensor is not None
-    return replace(cloud, points=cloud.points @ T[:3, :3].T + T[:3, 3], T_world_sensor=T @ cloud.T_world_sensor)
 
 
 def mapped(scans: list[LabelledCloud]) -> GPSemanticMap:

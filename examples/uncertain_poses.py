@@ -19,10 +19,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
+from semgp.evaluation.displaced import displaced
 from semgp.evaluation.scores import score
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.presets import OUTDOOR_LIDAR
@@ -34,21 +34,6 @@ Array = NDArray[np.float64]
 ERRORS = ((0.1, 0.2), (0.2, 0.4), (0.3, 0.6), (0.5, 1.0))  # metres, degrees
 SHOWN = 3
 MIDDLE = np.array([52.0, -3.0, 0.0])
-
-
-def displaced(cloud: LabelledCloud, metres: float, degrees: float, rng: np.random.Generator) -> LabelledCloud:
-    """A scan as a wrong pose places it, and the covariance of that error."""
-    assert cloud.T_world_sensor is not None
-    t = cloud.T_world_sensor[:3, 3]
-    error = np.eye(4)
-    error[:3, :3] = Rotation.from_rotvec(np.radians(degrees) * rng.normal(size=3)).as_matrix()
-    error[:3, 3] = t - error[:3, :3] @ t + metres * rng.normal(size=3)
-    return replace(
-        cloud,
-        points=cloud.points @ error[:3, :3].T + error[:3, 3],
-        T_world_sensor=error @ cloud.T_world_sensor,
-        pose_covariance=np.diag([metres**2] * 3 + [np.radians(degrees) ** 2] * 3),
-    )
 
 
 def mapped(scans: list[LabelledCloud], classes: Classes) -> GPSemanticMap:

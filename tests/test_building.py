@@ -14,9 +14,8 @@ from semgp.octomap import SemanticOctoMap
 from semgp.prediction import FREE
 from semgp.scene.building import MAST, ROBOT_HEIGHT, SyntheticBuilding
 from semgp.scene.floorplan import BUILDING_CLASSES, HEIGHT, LENGTH, MISTAKEN_FOR, WIDTH
-from semgp.scene.furniture import Solid
 from semgp.scene.lidar import Lidar, PatchFaults
-from semgp.scene.raycast import BOX, ELLIPSOID
+from tests.solids import level
 
 Array = NDArray[np.float64]
 
@@ -28,17 +27,6 @@ RADIUS = 0.25
 def exact(seed: int) -> SyntheticBuilding:
     """Return a building whose scans have neither noise nor wrong labels."""
     return SyntheticBuilding(seed, EXACT, RIGHT)
-
-
-def level(solid: Solid, points: Array) -> Array:
-    """Return below one for points inside a solid, one on its surface, above one outside, by its definition."""
-    c, s = np.cos(solid.yaw), np.sin(solid.yaw)
-    p = (points - solid.centre) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) / solid.half
-    if solid.shape == BOX:
-        return np.asarray(np.abs(p).max(axis=1))
-    if solid.shape == ELLIPSOID:
-        return np.asarray(np.sqrt((p**2).sum(axis=1)))
-    return np.asarray(np.maximum(np.hypot(p[:, 0], p[:, 1]), np.abs(p[:, 2])))
 
 
 def occupied(building: SyntheticBuilding, points: Array) -> NDArray[np.bool_]:

@@ -9,28 +9,17 @@ from numpy.typing import NDArray
 from semgp.checks import rigid_transform
 from semgp.classes import MISSING
 from semgp.errors import InputError
-from semgp.scene.furniture import Solid
 from semgp.scene.lidar import Lidar, PatchFaults
-from semgp.scene.raycast import BOX, ELLIPSOID, Solids, cast
+from semgp.scene.raycast import BOX, Solids, cast
 from semgp.scene.streets import BLOCK, MISTAKEN_FOR, ROAD, TOWN_CLASSES, town_block
 from semgp.scene.town import SyntheticTown
+from tests.solids import level
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int32]
 
 EXACT = Lidar(beams=24, columns=300, noise=0)
 LAP = 1420  # metres, a little more than one lap of the route
-
-
-def level(solid: Solid, points: Array) -> Array:
-    """Return below one for points inside a solid, one on its surface, above one outside, by its definition."""
-    c, s = np.cos(solid.yaw), np.sin(solid.yaw)
-    p = (points - solid.centre) @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) / solid.half
-    if solid.shape == BOX:
-        return np.asarray(np.abs(p).max(axis=1))
-    if solid.shape == ELLIPSOID:
-        return np.asarray(np.sqrt((p**2).sum(axis=1)))
-    return np.asarray(np.maximum(np.hypot(p[:, 0], p[:, 1]), np.abs(p[:, 2])))
 
 
 def labels_of(town: SyntheticTown, i: int) -> tuple[Labels, Labels]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -149,3 +150,9 @@ def checked_confidence(confidence: ArrayLike, n: int) -> NDArray[np.float32]:
     if not ((w >= 0) & (w <= 1)).all():
         raise InputError("confidence must lie between 0 (ignore the label) and 1 (a label like any other).")
     return w
+
+
+def require_seed(seed: object) -> None:
+    """Raise InputError for what is no whole number, or is negative."""
+    if not isinstance(seed, Integral) or seed < 0:
+        raise InputError(f"seed must be a whole number that is not negative, not {seed!r}.")

@@ -25,7 +25,8 @@ STEP = (1 << 2 * AXIS_BITS, 1 << AXIS_BITS, 1)
 OUTSIDE = -1
 """Key of a point beyond the range of the keys."""
 
-_EXACT = 2.0**52  # beyond this many voxels a float64 cannot tell one voxel from the next
+EXACT = 2.0**52
+"""Beyond this many voxels a float64 cannot tell one voxel from the next."""
 
 
 def voxel_origin(points: NDArray[np.float64], resolution: float) -> NDArray[np.int64]:
@@ -37,7 +38,7 @@ def voxel_origin(points: NDArray[np.float64], resolution: float) -> NDArray[np.i
         A resolution so fine, or a coordinate so large, that float64 cannot tell neighbouring voxels apart.
     """
     voxel = np.floor(points[0] / resolution)
-    if not (np.abs(voxel) < _EXACT).all():
+    if not (np.abs(voxel) < EXACT).all():
         raise InputError(f"a point at {points[0]} m cannot be put into voxels of {resolution} m.")
     return np.asarray(voxel.astype(np.int64))
 

@@ -84,7 +84,7 @@ def write_ply(
     InputError
         Arrays of other lengths, probabilities without classes, or whole numbers beyond 32 bits.
     """
-    columns = _coordinates(points)
+    columns = coordinates(points)
     n = len(columns[0][1])
     if colours is not None:
         rgb = _column("colours", colours, (n, 3))
@@ -97,7 +97,7 @@ def write_ply(
         p = _column("probability", probability, (n, len(classes))).astype("<f4")
         columns += zip(("p_" + re.sub(r"\s", "_", name) for name in classes.names), p.T)
     columns += [(name, _number_column(name, values, n)) for name, values in fields.items()]
-    header, rows = _ply_header(columns, n, classes), _rows(columns, n)
+    header, rows = ply_header(columns, n, classes), structured(columns, n)
     with atomic_write(path) as temporary, temporary.open("wb") as file:
         file.write(header)
         rows.tofile(file)
@@ -143,7 +143,14 @@ def write_npz(path: str | Path, cloud: LabelledCloud, **arrays: ArrayLike) -> No
         np.savez_compressed(file, allow_pickle=False, **present, **further)
 
 
-def _coordinates(points: ArrayLike) -> Columns:
+def coordinates(points: ArrayLike) -> Columns:
+    """Return the columns x, y and z of a PLY file: float32, or float64 where that would lose `LARGEST_ROUNDING`.
+
+    Raises
+    ------
+    InputError
+        Points that are not (N, 3) and finite.
+    """
     X = np.asarray(points, dtype=np.float64)
     if X.ndim != 2 or X.shape[1] != 3:
         raise InputError(f"points must have shape (N, 3), not {X.shape}.")
@@ -176,7 +183,7 @@ def _number_column(name: str, values: ArrayLike, n: int) -> NDArray[np.generic]:
     return column.astype("<i4")
 
 
-def _rows(columns: Columns, n: int) -> NDArray[np.void]:
+def structured(columns: Columns, n: int) -> NDArray[np.void]:
     """Return the columns as one structured array."""
     names = [name for name, _ in columns]
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -187,7 +194,14 @@ def _rows(columns: Columns, n: int) -> NDArray[np.void]:
     return rows
 
 
-def _ply_header(columns: Columns, n: int, classes: Classes | None) -> bytes:
+def ply_header(columns: Columns, n: int, classes: Classes | None, *further: str) -> bytes:
+    """Return the header of a binary PLY file of n vertices, with further lines before its end.
+
+    Raises
+    ------
+    InputError
+        A class name that a line of text cannot hold.
+    """
     types = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
     lines = ["ply", "format binary_little_endian 1.0", "comment written by semgp"]
     for label, (name, (red, green, blue)) in enumerate(zip(classes.names, classes.colours) if classes else ()):
@@ -196,4 +210,4 @@ def _ply_header(columns: Columns, n: int, classes: Classes | None) -> bytes:
         lines.append(f"comment semgp class {label} {red} {green} {blue} {name}")
     lines.append(f"element vertex {n}")
     lines += [f"property {types[column.dtype.str[1:]]} {name}" for name, column in columns]
-    return "\n".join([*lines, "end_header", ""]).encode()
+    return "\n".join([*lines, *further, "end_header", ""]).encode()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from semgp.blocks.field import Field
 from semgp.blocks.model import BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.pairs import Pairs, find_pairs
 from semgp.blocks.patches import patch
 from semgp.blocks.solve import JITTER
@@ -41,7 +42,7 @@ def featureless(n: int) -> NDArray[np.float32]:
 
 def filled(model: BlockModel, points: Array, labels: NDArray[np.int32], n_classes: int) -> Field:
     field = Field(model, n_classes)
-    field.add(points, labels, None, featureless(len(points)))
+    field.add(Observations(points, labels, None, featureless(len(points))))
     return field
 
 

@@ -13,6 +13,7 @@ from semgp.blocks.answer import Answers
 from semgp.blocks.field import Field
 from semgp.blocks.inputs import add_cloud
 from semgp.blocks.model import BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.sites import Sites
 from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
@@ -180,7 +181,9 @@ def test_any_order_against_plain_sums(seed: int, shift: float, parts: int) -> No
     sites = Sites(3, 1, EDGE)
     for part in np.array_split(rng.permutation(n), parts):
         draws = np.ones(len(part), np.int64)
-        sites.add(points[part], labels[part], None, height[part], confidence[part], variances[part], draws)
+        sites.add(
+            Observations(points[part], labels[part], None, height[part], confidence[part], variances[part], draws)
+        )
     found: Voxels = {}
     if sites.origin is not None:
         index = (voxel_index(sites.voxels.keys) + sites.origin).tolist()
@@ -225,7 +228,7 @@ def test_drift_counts_what_labels_count(soft: bool) -> None:
     for label, w, step in ((0, 0.5, 1.0), (0, 0.25, 0.5 / 3), (1, 0.25, 1.5 / 4), (1, 1.0, (1.5 - 0.25) / 2)):
         one = None if soft else np.full(1, label, np.int32)
         weights = np.eye(2, dtype=np.float32)[[label]] if soft else None
-        sites.add(point, one, weights, featureless(1), np.full(1, w, np.float32))
+        sites.add(Observations(point, one, weights, featureless(1), np.full(1, w, np.float32)))
         expected += step
         assert sites.drift[0] == pytest.approx(expected)
 

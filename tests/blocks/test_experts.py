@@ -8,6 +8,7 @@ import pytest
 from semgp.blocks.experts import solve_expert
 from semgp.blocks.field import Field
 from semgp.blocks.model import EXPERTS, BlockModel
+from semgp.blocks.observations import Observations
 from semgp.gp.expert import fit_expert
 from semgp.gp.model import GPModel
 from semgp.gp.stationary import Matern32, Matern52
@@ -138,7 +139,7 @@ def test_unknown_features_are_those_of_the_nearest_member() -> None:
     points = np.array([[1.0, 1, 1], [1.5, 1, 1], [1.0, 1.5, 1]])
     features = np.array([[3.0], [-2.0], [0.5]], np.float32)
     field = Field(model, C)
-    field.add(points, np.array([0, 1, 2], np.int32), None, features)
+    field.add(Observations(points, np.array([0, 1, 2], np.int32), None, features))
     unknown = field.query(points + 0.01, np.full((3, 1), np.nan, np.float32))
     known = field.query(points + 0.01, features)
     np.testing.assert_allclose(unknown.probability, known.probability, atol=1e-6)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from semgp.blocks.answer import Answers
 from semgp.blocks.field import Field
 from semgp.blocks.model import BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.sites import CELL
 from semgp.blocks.store import sorted_by
 from semgp.errors import InputError
@@ -33,7 +34,7 @@ def test_updates_in_any_order_give_the_bits_of_one_update(seed: int, n_updates: 
     queries = points[:100] + rng.normal(scale=0.1, size=(100, 3))
     at_once, step_by_step = filled(MODEL, points, labels, 3), Field(MODEL, 3)
     for part in np.array_split(rng.permutation(600), n_updates):
-        step_by_step.add(points[part], labels[part], None, featureless(len(part)))
+        step_by_step.add(Observations(points[part], labels[part], None, featureless(len(part))))
         if ask_between:
             step_by_step.query(queries[:10], featureless(10))
     assert_same(step_by_step.query(queries, featureless(100)), at_once.query(queries, featureless(100)))
@@ -45,7 +46,7 @@ def test_only_stale_cells_are_solved() -> None:
     field = filled(MODEL, points, np.zeros(8, np.int32), 2)
     assert field.solve() == 8
     assert field.solve() == 0
-    field.add(points[3:4] + 0.5, np.ones(1, np.int32), None, featureless(1))
+    field.add(Observations(points[3:4] + 0.5, np.ones(1, np.int32), None, featureless(1)))
     before = field.store.next_block
     assert field.store.stale.sum() == 3
     field.query(points[6:8], featureless(2))  # up to date already
@@ -76,7 +77,7 @@ def test_a_cell_without_sites_answers_from_those_round_about() -> None:
     answers = field.query(np.concatenate([beyond, inside]), featureless(2))
     np.testing.assert_allclose(answers.probability[0], answers.probability[1], atol=2e-3)
     # once it has sites, it answers from them as well
-    field.add(beyond, np.ones(1, np.int32), None, featureless(1))
+    field.add(Observations(beyond, np.ones(1, np.int32), None, featureless(1)))
     again = filled(model, np.concatenate([edge, beyond]), np.array([0, 1], np.int32), 2)
     assert_same(field.query(beyond, featureless(1)), again.query(beyond, featureless(1)))
 
@@ -88,7 +89,7 @@ def walked(n_updates: int) -> tuple[Field, Array]:
     for i in range(n_updates):
         centre = (6 + 5 * np.sin(i / 3), 2.0, 1.0)
         points = centre + rng.uniform(-1, 1, (60, 3)) * (1, 1, 0.1)
-        field.add(points, rng.integers(0, 2, 60).astype(np.int32), None, featureless(60))
+        field.add(Observations(points, rng.integers(0, 2, 60).astype(np.int32), None, featureless(60)))
         field.query(points[:5], featureless(5))
     return field, points
 
@@ -155,7 +156,7 @@ def test_memory_of_dropped_pieces_is_used_again(model: BlockModel) -> None:
     # as the map grows, pieces need rooms of other sizes
     for seed in (7, 8, 9):
         more, more_labels = street(seed, 500, 3)
-        field.add(more, more_labels, None, featureless(500))
+        field.add(Observations(more, more_labels, None, featureless(500)))
         for array in field.store._spare:
             array[:] = np.nan
         points, labels = np.concatenate([points, more]), np.concatenate([labels, more_labels])
@@ -217,11 +218,11 @@ def test_tolerance_leaves_what_has_hardly_changed() -> None:
     points, labels = street(3, 800, 2)
     field = filled(MODEL, points, labels, 2)
     field.solve()
-    field.add(points[:3], labels[:3], None, featureless(3))
+    field.add(Observations(points[:3], labels[:3], None, featureless(3)))
     assert field.store.stale.any()
     assert field.solve(tolerance=0.2) == 0
     more, labels = street(4, 800, 2)
-    field.add(more, labels, None, featureless(800))
+    field.add(Observations(more, labels, None, featureless(800)))
     assert field.solve(tolerance=0.2) > 0
     assert field.solve() >= 0
     both = np.concatenate([points, points[:3], more])

@@ -13,6 +13,7 @@ from semgp.blocks.field import Field
 from semgp.blocks.learning import error_frequencies
 from semgp.blocks.link import class_probabilities
 from semgp.blocks.model import CLOSED, BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.patches import Patch
 from semgp.errors import InputError
 from semgp.gp.stationary import Matern52
@@ -91,7 +92,7 @@ def field_of(model: BlockModel, classes: list[int], labelled: float) -> tuple[Fi
     if model.other:
         weights[:, C] = 1 - labelled
     field = Field(model, C)
-    field.add(points, None, weights, featureless(900))
+    field.add(Observations(points, None, weights, featureless(900)))
     return field, np.concatenate([points[:100] + 0.02, [[500.0, 0, 0]]])
 
 
@@ -167,7 +168,7 @@ def test_far_from_members_a_block_s_answer_is_that_of_no_block(name: str) -> Non
     rng = np.random.default_rng(2)
     field = Field(model, C)
     weights = 0.8 * rng.dirichlet(np.full(3, 0.4), 40)[:, [0, 1, 2, 2]] * (1, 1, 1, 0)
-    field.add(rng.uniform(0.05, 0.5, (40, 3)), None, weights.astype(np.float32), featureless(40))
+    field.add(Observations(rng.uniform(0.05, 0.5, (40, 3)), None, weights.astype(np.float32), featureless(40)))
     edge = 64 * model.resolution
     line = np.linspace((2.0, 2.0, 2.0), (3 * edge, 2.5, 2.2), 400)  # a cell, one without sites, one without blocks
     found = field.query(line, featureless(400))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from semgp.blocks.accumulate import MASS_UNIT
 from semgp.blocks.layout import COARSE_BITS, Layout, lay_out, neighbours
 from semgp.blocks.members import Members, Sizes, gather
+from semgp.blocks.observations import Observations
 from semgp.blocks.sites import CELL, Sites
 from semgp.blocks.tree import split
 from tests.blocks.naive import Array, Ints, featureless, voxel_index
@@ -34,7 +35,7 @@ def scene(seed: int, n: int) -> Scene:
     points = points[np.unique(np.floor(points / RESOLUTION), axis=0, return_index=True)[1]]
     sites = Sites(len(points), 0, RESOLUTION)
     labels = np.arange(len(points), dtype=np.int32)
-    sites.add(points, labels, None, featureless(len(points)))
+    sites.add(Observations(points, labels, None, featureless(len(points))))
     cells = np.argsort(sites.cells.keys).astype(np.int32)
     layout = lay_out(sites, cells)
     place = np.full(len(cells) + 1, -1, np.int32)
@@ -74,7 +75,7 @@ def test_layout_does_not_depend_on_the_order_of_points() -> None:
     made = []
     for order in (np.arange(400), np.concatenate([[0], 1 + rng.permutation(399)])):
         sites = Sites(3, 0, RESOLUTION)
-        sites.add(points[order], labels[order], None, featureless(400))
+        sites.add(Observations(points[order], labels[order], None, featureless(400)))
         made.append(lay_out(sites, np.argsort(sites.cells.keys).astype(np.int32)))
     for name in ("start", "X", "first", "n_coarse", "centre"):
         a, b = getattr(made[0], name), getattr(made[1], name)

@@ -7,6 +7,7 @@ import pytest
 
 from semgp.blocks.field import Field
 from semgp.blocks.model import BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.pairs import find_pairs
 from semgp.blocks.sites import CELL
 from semgp.voxels import HALF_RANGE
@@ -192,7 +193,7 @@ class TestHome:
         block, local = field.home(points, solve=True)
         assert (block >= 0).all()
         np.testing.assert_array_equal(local, before[1])
-        field.add(points[:1], labels[:1], None, featureless(1))
+        field.add(Observations(points[:1], labels[:1], None, featureless(1)))
         np.testing.assert_array_equal(field.home(points)[0], block)  # as they were solved
         solved = field.store.next_block
         field.home(points, solve=True)

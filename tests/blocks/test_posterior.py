@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from semgp.blocks.field import Field
 from semgp.blocks.linear import packed_size, unpack
 from semgp.blocks.model import CLOSED, BlockModel
+from semgp.blocks.observations import Observations
 from semgp.gp.kernels import Kernel
 from semgp.gp.stationary import Matern12, Matern32, Matern52, SquaredExponential
 from tests.blocks.naive import (
@@ -45,8 +46,8 @@ def small_scene(model: BlockModel, classes: list[int]) -> tuple[Field, Block, Ar
     weights = np.zeros((90, C), np.float32)
     weights[:, classes] = rng.dirichlet(np.full(len(classes), 0.3), 90)
     field = Field(model, C)
-    field.add(points[:60], None, weights[:60], featureless(60))
-    field.add(points[60:], rng.choice(classes, 30).astype(np.int32), None, featureless(30))
+    field.add(Observations(points[:60], None, weights[:60], featureless(60)))
+    field.add(Observations(points[60:], rng.choice(classes, 30).astype(np.int32), None, featureless(30)))
     sites = field.sites
     block = Block(sites.positions, sites.mass / 4096, np.ones(len(sites)))
     return field, block, np.concatenate([rng.uniform(0.7, 2.3, (70, 3)), points[:3]])
@@ -78,7 +79,7 @@ def test_what_blocks_keep(kernel: Kernel, other: bool) -> None:
     rows = np.zeros((900, C), np.float32)
     rows[np.arange(900), labels] = np.random.default_rng(8).uniform(0.2, 0.9, 900)
     field = Field(model, C)
-    field.add(points, None, rows, featureless(900))
+    field.add(Observations(points, None, rows, featureless(900)))
     field.solve()
     checked = set()
     for piece in field.store.pieces.values():
@@ -191,7 +192,7 @@ class TestFeatures:
         points, labels = street(2, 700, 3)
         features = np.random.default_rng(3).normal(size=(700, 2)).astype(np.float32)
         field = Field(self.model, 3)
-        field.add(points, labels, None, features)
+        field.add(Observations(points, labels, None, features))
         return field, points[:60] + 0.01
 
     def test_answers_follow_them(self) -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT
+from semgp.blocks.observations import Observations
 from semgp.blocks.sites import CELL, Sites, cell_keys
 from semgp.errors import InputError
 from tests.blocks.naive import Array, featureless, voxel_index
@@ -40,7 +41,7 @@ def voxels(sites: Sites) -> Voxels:
 def made(points: Array, weights: F32, features: F32, resolution: float, parts: int = 1) -> Sites:
     sites = Sites(weights.shape[1], features.shape[1], resolution)
     for part in np.array_split(np.arange(len(points)), parts):
-        sites.add(points[part], None, weights[part], features[part])
+        sites.add(Observations(points[part], None, weights[part], features[part]))
     return sites
 
 
@@ -75,7 +76,7 @@ def test_hard_labels_are_soft_ones_of_weight_one() -> None:
     points, labels = rng.uniform(0, 4, (300, 3)), rng.integers(0, 5, 300).astype(np.int32)
     features = rng.normal(size=(300, 1)).astype(np.float32)
     hard = Sites(5, 1, 0.4)
-    touched = hard.add(points, labels, None, features)
+    touched = hard.add(Observations(points, labels, None, features))
     soft = made(points, np.eye(5, dtype=np.float32)[labels], features, 0.4)
     assert touched.tolist() == list(range(len(hard.cells)))
     for name, array in soft.to_arrays().items():
@@ -95,7 +96,9 @@ def test_chains_hold_each_cell_s_sites() -> None:
     rng = np.random.default_rng(1)
     sites = Sites(2, 0, 0.1)
     for _ in range(4):
-        touched = sites.add(rng.uniform(-9, 9, (40, 3)), np.zeros(40, np.int32), None, featureless(40))
+        touched = sites.add(
+            Observations(rng.uniform(-9, 9, (40, 3)), np.zeros(40, np.int32), None, featureless(40))
+        )
         assert (np.diff(touched) > 0).all()
     index = voxel_index(sites.voxels.keys)
     np.testing.assert_array_equal(voxel_index(cell_keys(sites.voxels.keys)), index // CELL * CELL)
@@ -124,7 +127,7 @@ def test_drift_says_how_much_a_cell_has_changed() -> None:
     point, one = np.zeros((1, 3)), np.zeros(1, np.int32)
     expected_drift = 0.0
     for label, step in ((0, 1.0), (0, 0.5 / 2), (1, 1.5 / 3), (1, (1.5 - 1 / 3) / 4)):
-        sites.add(point, one + label, None, featureless(1))
+        sites.add(Observations(point, one + label, None, featureless(1)))
         expected_drift += step
         assert sites.drift[0] == pytest.approx(expected_drift)
 
@@ -154,18 +157,18 @@ def test_a_full_site_takes_no_more_labels() -> None:
     sites, step = Sites(1, 1, 0.1), 64 * MASS_UNIT
     point, features = np.array([[0.025, 0.05, 0.099]]), np.full((3000, 1), 3e4, np.float32)
     for _ in range(4):
-        sites.add(np.tile(point, (3000, 1)), None, np.full((3000, 1), 64, np.float32), features)
+        sites.add(Observations(np.tile(point, (3000, 1)), None, np.full((3000, 1), 64, np.float32), features))
     taken = 2**31 // step + 1  # the one that leads beyond 2^31 is the last
     assert sites.mass.tolist() == [[taken * step]]
     assert sites.mass.max() < 2**32
     np.testing.assert_allclose(sites.positions, point, atol=1e-8)
     assert sites.place[0, 3] == taken * step * 30_000 * FEATURE_UNIT
     before, drift = voxels(sites), sites.drift.copy()
-    touched = sites.add(point, np.zeros(1, np.int32), None, features[:1])
+    touched = sites.add(Observations(point, np.zeros(1, np.int32), None, features[:1]))
     assert touched.tolist() == [0]
     assert voxels(sites) == before
     np.testing.assert_array_equal(sites.drift, drift)
-    sites.add(point + 0.1, np.zeros(1, np.int32), None, features[:1])  # the next site is not full
+    sites.add(Observations(point + 0.1, np.zeros(1, np.int32), None, features[:1]))  # the next site is not full
     assert sites.mass.tolist() == [[taken * step], [MASS_UNIT]]
 
 
@@ -177,7 +180,7 @@ def test_what_is_full_is_the_mass_of_all_classes(soft: bool) -> None:
     one = None if soft else np.ones(1, np.int32)
     weights = np.array([[0, 1]], np.float32) if soft else None
     for _ in range(3):
-        sites.add(np.zeros((1, 3)), one, weights, featureless(1))
+        sites.add(Observations(np.zeros((1, 3)), one, weights, featureless(1)))
     assert sites.mass.tolist() == [[2**30, 2**30 + MASS_UNIT]]  # at 2^31 one more, beyond it none
 
 
@@ -185,10 +188,10 @@ def test_what_is_full_is_the_mass_of_all_classes(soft: bool) -> None:
 def test_a_refused_update_leaves_no_trace(far: float) -> None:
     sites = Sites(1, 0, 0.1)
     with pytest.raises(InputError, match="away from where the map"):
-        sites.add(np.array([[0.0, 0, 0], [far, 0, 0]]), np.zeros(2, np.int32), None, featureless(2))
+        sites.add(Observations(np.array([[0.0, 0, 0], [far, 0, 0]]), np.zeros(2, np.int32), None, featureless(2)))
     assert_new(sites)
     elsewhere = np.array([[far + 1.0, 0, 0]])
-    sites.add(elsewhere, np.zeros(1, np.int32), None, featureless(1))
+    sites.add(Observations(elsewhere, np.zeros(1, np.int32), None, featureless(1)))
     np.testing.assert_allclose(sites.positions, elsewhere)
 
 
@@ -212,13 +215,13 @@ def test_refused_updates(name: str) -> None:
     points, weights, features = REFUSED[name]
     sites = Sites(1, 1, 0.1)
     with pytest.raises(InputError):
-        sites.add(points, None, weights, features)
+        sites.add(Observations(points, None, weights, features))
     assert_new(sites)
     rng = np.random.default_rng(4)
-    sites.add(rng.uniform(0, 9, (50, 3)), np.zeros(50, np.int32), None, np.ones((50, 1), np.float32))
+    sites.add(Observations(rng.uniform(0, 9, (50, 3)), np.zeros(50, np.int32), None, np.ones((50, 1), np.float32)))
     before, cells, drift = voxels(sites), sites.cells.keys.copy(), sites.drift.copy()
     with pytest.raises(InputError):
-        sites.add(points, None, weights, features)
+        sites.add(Observations(points, None, weights, features))
     assert voxels(sites) == before
     np.testing.assert_array_equal(sites.cells.keys, cells)
     np.testing.assert_array_equal(sites.drift, drift)
@@ -237,7 +240,7 @@ class TestStored:
         np.testing.assert_array_equal(again.positions, sites.positions)
         more = np.full((1, 3), 5e6), np.zeros(1, np.int32), None, np.ones((1, 1), np.float32)
         for s in (sites, again):
-            s.add(*more)
+            s.add(Observations(*more))
         assert voxels(again) == voxels(sites)
 
     def test_nothing_round_trips(self) -> None:

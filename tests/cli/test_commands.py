@@ -13,12 +13,6 @@ from semgp.writers import write_npz
 
 
 @pytest.fixture
-def scan(corner: LabelledCloud, tmp_path: Path) -> Path:
-    write_npz(tmp_path / "scan.npz", corner)
-    return tmp_path / "scan.npz"
-
-
-@pytest.fixture
 def built(scan: Path) -> Path:
     out = scan.with_name("map.semgp")
     run("build", scan, "--out", out, "--quiet")

@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semgp.cloud import LabelledCloud
 from semgp.maps.files import load_map
 from semgp.readers import read
-from semgp.writers import write_npz
 from tests.cli.test_commands import run
-
-
-@pytest.fixture
-def scan(corner: LabelledCloud, tmp_path: Path) -> Path:
-    write_npz(tmp_path / "scan.npz", corner)
-    return tmp_path / "scan.npz"
 
 
 @pytest.fixture

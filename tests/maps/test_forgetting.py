@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgp.blocks.accumulate import MASS_UNIT
 from semgp.blocks.model import BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.sites import Sites, cell_keys, cell_origin
 from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
@@ -120,7 +121,11 @@ class TestSites:
         weights = (rng.random((n, 3)) * rng.choice([0.5, 5, 50], (n, 1))).astype(np.float32)
         features = rng.normal(size=(n, 1)).astype(np.float32)
         draws = np.ones(n, np.int64)
-        sites.add(rng.uniform(0, 18, (n, 3)), None, weights, features, None, rng.random((n, 3)) * 0.01, draws)
+        sites.add(
+            Observations(
+                rng.uniform(0, 18, (n, 3)), None, weights, features, None, rng.random((n, 3)) * 0.01, draws
+            )
+        )
         return sites
 
     @pytest.mark.parametrize("half_life", [1.0, 3.0, 10.0, 64.0])
@@ -143,7 +148,9 @@ class TestSites:
         """Ten scans a second, ten minutes: labels must fade all the same."""
         sites = Sites(1, 0, EDGE)
         points = np.array([[0.05, 0.05, 0.05], [0.15, 0.05, 0.05], [0.25, 0.05, 0.05]])
-        sites.add(points, None, np.array([[0.5], [1.0], [4.0]], np.float32), np.empty((3, 0), np.float32))
+        sites.add(
+            Observations(points, None, np.array([[0.5], [1.0], [4.0]], np.float32), np.empty((3, 0), np.float32))
+        )
         before = sites.mass.astype(float)
         for step in range(half_life):
             sites.clock = step + 1.0
@@ -199,7 +206,7 @@ class TestSites:
     def test_a_new_cell_does_not_fade_for_the_time_before_it(self) -> None:
         sites = Sites(1, 0, EDGE)
         sites.clock = 100.0
-        sites.add(np.zeros((1, 3)), np.zeros(1, np.int32), None, np.empty((1, 0), np.float32))
+        sites.add(Observations(np.zeros((1, 3)), np.zeros(1, np.int32), None, np.empty((1, 0), np.float32)))
         sites.clock = 101.0
         sites.fade(np.array([0]), 1.0)
         assert sites.mass.tolist() == [[MASS_UNIT // 2]]

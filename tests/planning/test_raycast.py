@@ -10,8 +10,8 @@ from semgp.baselines.knn import KNNMap
 from semgp.classes import MISSING
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
+from semgp.maps.protocol import BATCH
 from semgp.planning import raycast
-from semgp.planning.asking import BATCH
 from semgp.scene.raycast import cast
 from tests.planning import naive
 from tests.planning.box_world import CLASSES, FLOOR, TABLE, WALL, BoxWorld, room

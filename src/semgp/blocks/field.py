@@ -15,6 +15,7 @@ from semgp.blocks.covariance import mixture
 from semgp.blocks.expert_answer import answer_by_experts
 from semgp.blocks.layout import around_keys, lay_out, neighbours
 from semgp.blocks.model import CLOSED, EXPERTS, BlockModel
+from semgp.blocks.observations import Observations
 from semgp.blocks.pairs import CellTrees, find_pairs, home_blocks, mark_cells
 from semgp.blocks.sites import CELL, Sites
 from semgp.blocks.solve import solve_cells
@@ -50,17 +51,8 @@ class Field:
         self._unknown = prior_probabilities(self._link, n_classes) if pooled else self._link.prior
         self.prior_variance = float(self._kernel.variance.sum())
 
-    def add(
-        self,
-        points: F64,
-        labels: I32 | None,
-        weights: F32 | None,
-        features: F32,
-        confidence: F32 | None = None,
-        variances: F64 | None = None,
-        draws: I64 | None = None,
-    ) -> None:
-        """Add labelled points, see `Sites.add`; the blocks that they reach are solved again when next needed.
+    def add(self, given: Observations) -> None:
+        """Add labelled points; the blocks that they reach are solved again when next needed.
 
         Raises
         ------
@@ -68,12 +60,12 @@ class Field:
             Points a million voxels from the first, numbers beyond what a site can hold, or uncertain positions for
             experts.
         """
-        if variances is not None and self.model.posterior in EXPERTS:
+        if given.variances is not None and self.model.posterior in EXPERTS:
             raise InputError(
                 f"blocks of {self.model.posterior} experts take positions as certain: leave covariances out, or "
                 f"use one of {', '.join(CLOSED)}."
             )
-        touched = self.sites.add(points, labels, weights, features, confidence, variances, draws)
+        touched = self.sites.add(given)
         self.touch(touched)
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -23,7 +23,7 @@ def add_cloud(field: Field, cloud: LabelledCloud) -> None:
     InputError
         A cloud without the features that the model asks for, or points a million voxels from the first.
     """
-    field.add(*cloud_inputs(cloud, field.model.features))
+    field.add(cloud_inputs(cloud, field.model.features))
 
 
 def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Observations:
@@ -43,8 +43,8 @@ def cloud_inputs(cloud: LabelledCloud, features: tuple[str, ...]) -> Observation
         None if cloud.weights is None else cloud.class_weights[keep],
         columns[keep],
         None if cloud.confidence is None else cloud.confidence[keep],
-        None if certain else cloud_variances(cloud[keep]).astype(np.float64),
-        None if certain else cloud_draws(cloud[keep]),
+        None if certain else cloud_variances(cloud)[keep].astype(np.float64),
+        None if certain else cloud_draws(cloud)[keep],
     )
 
 

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from semgp.blocks.accumulate import PLACE_UNIT
 from semgp.blocks.arrays import F64, I64, U32
-from semgp.blocks.sites import CELL_BITS
+from semgp.blocks.sites import cell_corner
 from semgp.errors import InputError
-from semgp.voxels import HALF_RANGE, MARGIN, STEP, VoxelTable, voxel_indices
+from semgp.voxels import EXACT, HALF_RANGE, MARGIN, STEP, VoxelTable, voxel_indices
 
 _MOST = (1 << 32) - 1  # the mass that a site can hold, a million labels
-_EXACT = 2.0**52  # beyond this many voxels a float64 cannot tell one voxel from the next
 
 
 class Sums(NamedTuple):
@@ -60,7 +59,7 @@ def moved(sums: Sums, T: F64, resolution: float, new: float) -> Sums:
         A transform to where neighbouring voxels cannot be told apart.
     """
     R, t = T[:3, :3], T[:3, 3]
-    if not (np.abs(t) < _EXACT * new).all():
+    if not (np.abs(t) < EXACT * new).all():
         raise InputError(
             f"the transform moves a map by {t} m, too far for voxels of {new:g} m: choose a nearer frame."
         )
@@ -68,7 +67,7 @@ def moved(sums: Sums, T: F64, resolution: float, new: float) -> Sums:
     turned = not np.allclose(R, np.eye(3), rtol=0, atol=1e-12)
     if new == resolution and not turned and np.allclose(t / new, shift, rtol=0, atol=1e-6):
         whole = shift.astype(np.int64)
-        return sums._replace(voxels=sums.voxels + whole, origin=_corner(sums.origin + whole))
+        return sums._replace(voxels=sums.voxels + whole, origin=cell_corner(sums.origin + whole))
     total = sums.mass.sum(axis=1, dtype=np.int64)[:, None]
     mean = (sums.voxels + sums.place[:, :3] / (total * float(PLACE_UNIT))) * resolution
     v = (mean @ R.T + t) / new
@@ -81,7 +80,7 @@ def moved(sums: Sums, T: F64, resolution: float, new: float) -> Sums:
         sums.mass,
         np.hstack([within, sums.place[:, 3:]]),
         np.hstack([variance, sums.spread[:, 3:]]),
-        _corner(voxels[0]) if len(voxels) else sums.origin,
+        cell_corner(voxels[0]) if len(voxels) else sums.origin,
     )
 
 
@@ -112,11 +111,6 @@ def joined(parts: Sequence[Sums], origin: I64) -> dict[str, NDArray[Any]]:
         _add(at, part.mass, part.place, part.spread, mass, place, spread)
     arrays: dict[str, NDArray[Any]] = {"voxels": table.keys, "mass": mass, "place": place, "origin": origin}
     return arrays | ({"spread": spread} if uncertain else {})
-
-
-def _corner(voxel: I64) -> I64:
-    """The lowest voxel (3,) of the cell that a voxel lies in."""
-    return np.asarray(voxel >> CELL_BITS << CELL_BITS)
 
 
 def _keys(voxels: I64, origin: I64) -> I64:

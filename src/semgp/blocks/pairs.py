@@ -6,12 +6,13 @@ answer changes without a jump, therefore, when a point crosses the border betwee
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F32, F64, I8, I32, I64, Bool
+from semgp.blocks.growing import longer, longer_rows
 from semgp.blocks.sites import CELL, CELL_BITS
 from semgp.blocks.tree import overlapped
 from semgp.voxels import AXIS_BITS, HALF_RANGE, slot_of
@@ -65,7 +66,7 @@ def mark_cells(
                         needed[cell] = True
                     elif n == 0 or unknown[n - 1] != key:
                         if n == len(unknown):
-                            unknown = _longer(unknown, 2 * n)
+                            unknown = longer(unknown, 2 * n)
                         unknown[n] = key
                         n += 1
     return unknown[:n]
@@ -101,8 +102,8 @@ def find_pairs(points: F64, chosen: I64, resolution: float, origin: F64, half: f
     for i in chosen:
         if n + 8 * _MOST > capacity:
             capacity = 2 * capacity + 8 * _MOST
-            point, block = _longer(point, capacity), _longer(block, capacity)
-            weight, local = _longer(weight, capacity), _longer_rows(local, capacity)
+            point, block = longer(point, capacity), longer(block, capacity)
+            weight, local = longer(weight, capacity), longer_rows(local, capacity)
         if not _place(points[i], resolution, origin, v):
             point[n], block[n], weight[n] = i, -1, 1
             for d in range(3):
@@ -198,22 +199,3 @@ def _share(v: float, half: float, x: int, low: int, high: int) -> float:
         return 1.0
     a, b = max(v - half, float(x * CELL)), min(v + half, float((x + 1) * CELL))
     return max(b - a, 0.0) / (2 * half)
-
-
-@njit(cache=True, nogil=True)
-def _longer(a: Any, n: int) -> Any:
-    """The array with room for n numbers."""
-    out = np.empty(n, a.dtype)
-    for i in range(len(a)):
-        out[i] = a[i]
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _longer_rows(a: F32, n: int) -> F32:
-    """The array with room for n rows."""
-    out = np.empty((n, a.shape[1]), a.dtype)
-    for i in range(len(a)):
-        for d in range(a.shape[1]):
-            out[i, d] = a[i, d]
-    return out

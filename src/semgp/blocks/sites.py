@@ -21,7 +21,7 @@ from semgp.blocks.accumulate import (
     fade_cells,
     fade_rows,
 )
-from semgp.blocks.arrays import F32, F64, I32, I64, U32, Bool
+from semgp.blocks.arrays import F64, I32, I64, U32, Bool
 from semgp.blocks.observations import Observations, counted
 from semgp.errors import InputError
 from semgp.voxels import VoxelTable, voxel_indices, voxel_keys, voxel_origin
@@ -127,24 +127,14 @@ class Sites:
         owned = (self._mass, self._place, self._spread, self._next, self._cell, self._head, self._size)
         return sum(a.nbytes for a in owned) + self.voxels.n_bytes + self.cells.n_bytes
 
-    def add(
-        self,
-        points: F64,
-        labels: I32 | None,
-        weights: F32 | None,
-        features: F32,
-        confidence: F32 | None = None,
-        variances: F64 | None = None,
-        draws: I64 | None = None,
-    ) -> I32:
-        """Add labelled points, see `Observations`, and return the cells that they lie in.
+    def add(self, given: Observations) -> I32:
+        """Add labelled points and return the cells that they lie in.
 
         Raises
         ------
         InputError
             Points a million voxels from the first, or weights, features or variances beyond what a sum can hold.
         """
-        given = Observations(points, labels, weights, features, confidence, variances, draws)
         (points, labels, weights, features, _, variances, draws), amounts = counted(given)
         if not len(points):
             return np.empty(0, dtype=np.int32)
@@ -269,7 +259,12 @@ class Sites:
 
 def cell_origin(points: F64, resolution: float) -> I64:
     """Return the origin (3,) of the keys of a map that begins with `points`: the corner of a cell."""
-    return np.asarray(voxel_origin(points, resolution) >> CELL_BITS << CELL_BITS)
+    return cell_corner(voxel_origin(points, resolution))
+
+
+def cell_corner(voxel: I64) -> I64:
+    """Return the lowest voxel (3,) of the cell that a voxel lies in."""
+    return np.asarray(voxel >> CELL_BITS << CELL_BITS)
 
 
 def cell_keys(keys: I64) -> I64:

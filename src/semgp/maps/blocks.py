@@ -77,7 +77,7 @@ class ManyBlocks:
         """
         inputs = cloud_inputs(cloud, self.model.features)
         if self.occupancy is None or not len(cloud):
-            self._field.add(*inputs)
+            self._field.add(inputs)
             return
         require_summable(inputs)
         origin, forgetting, watched = self._origin(cloud), self.forgetting, np.empty(0, dtype=bool)
@@ -91,7 +91,7 @@ class ManyBlocks:
             field.sites.origin = origin
         if forgetting is not None:
             self._forget(forgetting, np.concatenate([rays.points, inputs.points]), rays.passed, now)
-        self._field.add(*inputs)
+        self._field.add(inputs)
         self.occupancy.add(rays)
 
     def _origin(self, cloud: LabelledCloud) -> I64:
@@ -178,9 +178,10 @@ class ManyBlocks:
 
     def info(self) -> dict[str, Any]:
         """Return counts and memory: the sites' own, and what solved blocks take while they are in use."""
-        fields = {"": self._field} if self.occupancy is None else {"": self._field, "free_": self.occupancy.field}
         return {"cell_metres": CELL * self.model.resolution} | {
-            prefix + name: value for prefix, field in fields.items() for name, value in _counts(field).items()
+            prefix.replace(".", "_") + name: value
+            for prefix, field in self._fields.items()
+            for name, value in _counts(field).items()
         }
 
     def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

@@ -19,7 +19,7 @@ from semgp.maps.forgetting import Forgetting
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.occupancy import FREE, OCCUPIED, Occupancy
 from semgp.maps.presets import GENERAL
-from semgp.maps.protocol import query_points, require_classes
+from semgp.maps.protocol import NO_FREE_SPACE, query_points, require_classes
 from semgp.maps.whole import WholeScan
 from semgp.prediction import OccupancyPrediction, Prediction
 
@@ -184,7 +184,7 @@ class GPSemanticMap:
     def _occupancy(self) -> Occupancy:
         occupancy = self._state.occupancy if isinstance(self._state, ManyBlocks) else None
         if occupancy is None:
-            raise InputError("the map keeps no free space: make it with GPSemanticMap(..., free=FreeSpace()).")
+            raise InputError(NO_FREE_SPACE)
         return occupancy
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from semgp.blocks.arrays import F64, I32, I64, Bool
 from semgp.blocks.field import Field
+from semgp.blocks.observations import Observations
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.free_space import FreeSpace
@@ -55,7 +56,7 @@ class Occupancy:
         """Add what `sample` gave."""
         confidence = np.where(rays.labels == FREE, np.float32(self.free.weight), np.float32(1))
         nothing = np.empty((len(rays.points), 0), dtype=np.float32)
-        self.field.add(rays.points, rays.labels, None, nothing, confidence)
+        self.field.add(Observations(rays.points, rays.labels, None, nothing, confidence))
 
     def sample(self, cloud: LabelledCloud, origin: I64, watched: Bool) -> Rays:
         """Return the points of a cloud, as occupied, and samples along its rays, as free.
@@ -78,25 +79,25 @@ class Occupancy:
         if sensor is None:
             raise InputError("the cloud has no T_world_sensor, and rays begin at the sensor: give its pose.")
         sites = self.field.sites
-        for ends in (sensor[None], cloud.points):  # samples lie between them: both must be in range
-            voxel_keys(ends, resolution, origin)
-        reach = np.inf if free.reach is None else free.reach
-        hits = cloud.points
+        voxel_keys(sensor[None], resolution, origin)  # samples lie between sensor and points: both are in range
+        hits, hit_keys, reach = cloud.points, voxel_keys(cloud.points, resolution, origin), np.inf
         if free.reach is not None:
-            hits = hits[((hits - sensor) ** 2).sum(axis=1) <= reach**2]
+            reach = free.reach
+            near = ((hits - sensor) ** 2).sum(axis=1) <= reach**2
+            hits, hit_keys = hits[near], hit_keys[near]
         walk = Walk(
             resolution, origin.astype(np.float64), free.rays / len(cloud), free.seed, free.margin * resolution,
             free.near * resolution, free.thin, reach,
         )  # fmt: skip
         samples, keys, passed = free_samples(sensor, cloud.points, walk, sites.voxels, watched)
         table = VoxelTable()
-        at_hits = _first(table, voxel_keys(hits, resolution, origin))
+        at_hits = _first(table, hit_keys)
         at_samples = _first(table, keys)
         points = np.concatenate([hits[at_hits], samples[at_samples]])
         labels = np.repeat(np.array([OCCUPIED, FREE], np.int32), [len(at_hits), len(at_samples)])
         seen_through = sites.voxels.keys[np.flatnonzero(passed)]
-        at_end = table.find(seen_through) < len(at_hits)
-        return Rays(points, labels, seen_through[~(at_end & (table.find(seen_through) >= 0))])
+        row = table.find(seen_through)
+        return Rays(points, labels, seen_through[(row < 0) | (row >= len(at_hits))])
 
     def answer(self, X: F64, tolerance: float = 0.0) -> OccupancyPrediction:
         """Return what is known at points (M, 3)."""

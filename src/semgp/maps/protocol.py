@@ -81,6 +81,28 @@ class SpatialMap(SemanticMap, Protocol):
         ...
 
 
+BATCH = 1 << 17
+"""Points that planners and surfaces ask a map about at once: bounds the memory."""
+
+NO_FREE_SPACE = (
+    "the map keeps no free space, and says nowhere that nothing is there: make a GPSemanticMap(..., "
+    "free=FreeSpace()) or a SemanticOctoMap, and update it with clouds that have a T_world_sensor."
+)
+
+
+def occupancy_of(prediction: Prediction) -> OccupancyPrediction:
+    """Return whether something is there.
+
+    Raises
+    ------
+    InputError
+        The prediction of a map that keeps no free space.
+    """
+    if prediction.occupancy is None:
+        raise InputError(NO_FREE_SPACE)
+    return prediction.occupancy
+
+
 def require_classes(cloud: LabelledCloud, classes: Classes) -> None:
     """Check that a cloud's labels speak of a map's classes.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F64, I64, Bool
+from semgp.blocks.growing import longer, longer_rows
 from semgp.parallel import n_workers, parallel_map, slices
 from semgp.voxels import AXIS_BITS, HALF_RANGE, STEP, VoxelTable, slot_of
 
@@ -69,7 +70,7 @@ def _walk(sensor: F64, points: F64, walk: Walk, slots: I64, known: I64, watched:
         begin = min(length - walk.margin, walk.reach) - phase * step
         count = int(np.floor(begin / step))
         if n + count > len(keys):
-            samples, keys = _longer(samples, keys, 2 * (n + count))
+            samples, keys = longer_rows(samples, 2 * (n + count)), longer(keys, 2 * (n + count))
         near = int(np.ceil((begin - (length - walk.near)) / step))
         n = _along(sensor, d, begin, count, near, walk, slots, known, watched, passed, samples, keys, n)
     return samples[:n], keys[:n], passed
@@ -131,14 +132,3 @@ def _mixed(d: F64, seed: int) -> np.uint64:
         h = (h ^ np.uint64(np.int64(np.rint(d[k] * 1e4)) & 0x7FFFFFFFFFFFFFFF)) * _HASH
         h ^= h >> np.uint64(29)
     return h * _HASH
-
-
-@njit(cache=True, nogil=True)
-def _longer(samples: F64, keys: I64, n: int) -> tuple[F64, I64]:
-    """The arrays with room for n."""
-    more_samples, more_keys = np.empty((n, 3)), np.empty(n, np.int64)
-    for i in range(len(keys)):
-        more_keys[i] = keys[i]
-        for k in range(3):
-            more_samples[i, k] = samples[i, k]
-    return more_samples, more_keys

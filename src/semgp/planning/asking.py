@@ -9,32 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgp.checks import as_array, require_finite
 from semgp.errors import InputError
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, SpatialMap, occupancy_of
 from semgp.parallel import slices
 from semgp.prediction import OccupancyPrediction, Prediction
 
-BATCH = 1 << 17
-"""Points asked at once."""
-
 LONGEST = 1_000_000
 """Most samples along one ray."""
-
-
-def occupancy_of(prediction: Prediction) -> OccupancyPrediction:
-    """Return whether something is there.
-
-    Raises
-    ------
-    InputError
-        The prediction of a map that keeps no free space.
-    """
-    if prediction.occupancy is None:
-        raise InputError(
-            "the map does not say whether something is there, and planners need to know where nothing is: make a "
-            "GPSemanticMap(..., free=FreeSpace()) or a SemanticOctoMap, and update it with clouds that have a "
-            "T_world_sensor."
-        )
-    return prediction.occupancy
 
 
 def require_occupancy(semantic_map: SpatialMap, somewhere: NDArray[np.float64]) -> None:

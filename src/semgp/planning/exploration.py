@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, SpatialMap
 from semgp.maps.settings import require_positive
 from semgp.parallel import slices
-from semgp.planning.asking import BATCH, require_occupancy
+from semgp.planning.asking import require_occupancy
 from semgp.planning.boxes import box_corners, cells_between
 from semgp.prediction import FREE, UNKNOWN
 

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgp.classes import MISSING, Classes
 from semgp.errors import InputError
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, SpatialMap, occupancy_of
 from semgp.maps.settings import require_positive
 from semgp.parallel import slices
-from semgp.planning.asking import BATCH, occupancy_of
 from semgp.planning.boxes import box_corners, cells_between, require_few
 from semgp.prediction import OCCUPIED, UNKNOWN
 from semgp.writers import atomic_write

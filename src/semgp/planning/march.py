@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, SpatialMap
 from semgp.parallel import slices
-from semgp.planning.asking import BATCH, occupancy_at, samples_along
+from semgp.planning.asking import occupancy_at, samples_along
 from semgp.planning.shell import Shell, next_samples, shell_around
 
 F64 = NDArray[np.float64]

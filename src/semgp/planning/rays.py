@@ -10,18 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from semgp.checks import as_array, require_finite
 from semgp.classes import MISSING
 from semgp.errors import InputError
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, SpatialMap, occupancy_of
 from semgp.maps.settings import require_positive
 from semgp.parallel import slices
-from semgp.planning.asking import (
-    BATCH,
-    answers,
-    occupancy_at,
-    occupancy_of,
-    require_occupancy,
-    samples_along,
-    unit_directions,
-)
+from semgp.planning.asking import answers, occupancy_at, require_occupancy, samples_along, unit_directions
 from semgp.planning.march import Rays, first_surfaces
 
 F64 = NDArray[np.float64]

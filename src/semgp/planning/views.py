@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgp.checks import as_array, rigid_transform
 from semgp.errors import InputError
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import SpatialMap, occupancy_of
 from semgp.maps.settings import require_positive
 from semgp.parallel import slices
-from semgp.planning.asking import answers, occupancy_of, require_occupancy, samples_along, unit_directions
+from semgp.planning.asking import answers, require_occupancy, samples_along, unit_directions
 from semgp.planning.channels import class_information, occupancy_information, require_errors
 from semgp.voxels import VoxelTable, voxel_centres, voxel_keys, voxel_origin
 

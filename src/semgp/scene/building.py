@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from semgp.checks import require_finite, rigid_transform
+from semgp.checks import require_finite, require_seed, rigid_transform
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
@@ -57,8 +57,7 @@ class SyntheticBuilding:
     faults: PatchFaults = field(default_factory=PatchFaults)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.seed, Integral) or self.seed < 0:
-            raise InputError(f"seed must be a whole number that is not negative, not {self.seed!r}.")
+        require_seed(self.seed)
 
     @property
     def classes(self) -> Classes:

@@ -10,6 +10,7 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import NDArray
 
+from semgp.checks import require_seed
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
@@ -68,8 +69,7 @@ class SyntheticTown:
     faults: PatchFaults = field(default_factory=PatchFaults)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.seed, Integral) or self.seed < 0:
-            raise InputError(f"seed must be a whole number that is not negative, not {self.seed!r}.")
+        require_seed(self.seed)
 
     @property
     def classes(self) -> Classes:

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgp.classes import MISSING
 from semgp.errors import InputError
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, NO_FREE_SPACE, SpatialMap
 from semgp.maps.settings import require_positive
 from semgp.parallel import slices
 from semgp.surfaces.contour import contour, require_marching_cubes
 from semgp.surfaces.evidence import seen
-from semgp.surfaces.field import BATCH, NO_FREE_SPACE, Progress, lattice_field
+from semgp.surfaces.field import Progress, lattice_field
 from semgp.surfaces.lattice import box_between, lattice_near
 from semgp.surfaces.mesh import Mesh, vertex_normals
 

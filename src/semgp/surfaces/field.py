@@ -8,24 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logit
 
-from semgp.errors import InputError
-from semgp.maps.protocol import SpatialMap
+from semgp.maps.protocol import BATCH, SpatialMap, occupancy_of
 from semgp.parallel import slices
-from semgp.prediction import OccupancyPrediction, Prediction
 from semgp.surfaces.lattice import Box, Lattice
 
 F32 = NDArray[np.float32]
 
-NO_FREE_SPACE = (
-    "the map keeps no free space, and a surface is where that begins: make a GPSemanticMap(..., free=FreeSpace()) "
-    "or a SemanticOctoMap, and update it with clouds that have a T_world_sensor."
-)
-
 Progress = Callable[[int, int], None]
 """Called with the number of bricks done and of all."""
-
-BATCH = 1 << 17
-"""Points that a map is asked about at once: bounds the memory."""
 
 LEAST, MOST = 1e-4, 16.0
 """Log-odds are kept this far from the level and no further than that from it.
@@ -33,19 +23,6 @@ LEAST, MOST = 1e-4, 16.0
 On the level itself, vertices of different edges would fall together at a node; probabilities of 0 and 1 have no
 finite log-odds, and in single precision none beyond 16.
 """
-
-
-def require_occupancy(prediction: Prediction) -> OccupancyPrediction:
-    """Return what a prediction says of occupancy.
-
-    Raises
-    ------
-    InputError
-        It says nothing.
-    """
-    if prediction.occupancy is None:
-        raise InputError(NO_FREE_SPACE)
-    return prediction.occupancy
 
 
 def lattice_field(
@@ -101,7 +78,7 @@ def _log_odds(
         p = occupancy.probability.astype(np.float64)
     else:
         prediction = semantic_map.query(X)
-        occupancy = require_occupancy(prediction)
+        occupancy = occupancy_of(prediction)
         p = occupancy.probability.astype(np.float64) * prediction.probability[:, class_]
     g = np.clip(logit(p) - logit(level), -MOST, MOST)
     g = np.copysign(np.maximum(np.abs(g), LEAST), g)
