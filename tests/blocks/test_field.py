@@ -8,10 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from semgp.blocks.answer import Answers
+from semgp.blocks.cells import CELL
 from semgp.blocks.field import Field
 from semgp.blocks.model import BlockModel
 from semgp.blocks.observations import Observations
-from semgp.blocks.sites import CELL
 from semgp.blocks.store import sorted_by
 from semgp.errors import InputError
 from tests.blocks.naive import Array, Ints, featureless, filled, piece_of, street, voxel_index

@@ -8,10 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from semgp.blocks.accumulate import MASS_UNIT
+from semgp.blocks.cells import CELL
 from semgp.blocks.layout import COARSE_BITS, Layout, lay_out, neighbours
 from semgp.blocks.members import Members, Sizes, gather
 from semgp.blocks.observations import Observations
-from semgp.blocks.sites import CELL, Sites
+from semgp.blocks.sites import Sites
 from semgp.blocks.tree import split
 from tests.blocks.naive import Array, Ints, featureless, voxel_index
 

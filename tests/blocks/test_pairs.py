@@ -5,11 +5,11 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
+from semgp.blocks.cells import CELL
 from semgp.blocks.field import Field
 from semgp.blocks.model import BlockModel
 from semgp.blocks.observations import Observations
 from semgp.blocks.pairs import find_pairs
-from semgp.blocks.sites import CELL
 from semgp.voxels import HALF_RANGE
 from tests.blocks.naive import (
     Array,

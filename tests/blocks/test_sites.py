@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT
+from semgp.blocks.cells import CELL, cell_keys
 from semgp.blocks.observations import Observations
-from semgp.blocks.sites import CELL, Sites, cell_keys
+from semgp.blocks.sites import Sites
 from semgp.errors import InputError
 from tests.blocks.naive import Array, featureless, voxel_index
 

@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from semgp.blocks.cells import CELL
 from semgp.blocks.learning import class_frequencies, learn_from_scans
 from semgp.blocks.model import BlockModel
-from semgp.blocks.sites import CELL
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.evaluation.semantic_kitti import VERTICAL, kitti_task

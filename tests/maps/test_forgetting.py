@@ -12,9 +12,10 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from semgp.blocks.accumulate import MASS_UNIT
+from semgp.blocks.cells import cell_keys, cell_origin
 from semgp.blocks.model import BlockModel
 from semgp.blocks.observations import Observations
-from semgp.blocks.sites import Sites, cell_keys, cell_origin
+from semgp.blocks.sites import Sites
 from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
@@ -523,7 +524,6 @@ class TestLongLife:
         assert isinstance(loaded, GPSemanticMap)
         assert_same(updated(loaded, *clouds[3:]), straight)
 
-    @pytest.mark.xfail(reason="times are stored unless the clock is 0", strict=True)
     def test_saved_at_the_time_0_and_gone_on_with(self, tmp_path: Path) -> None:
         made = updated(new(Forgetting(1.0, per="second")), scan(0.0, stamp=-8.0))
         updated(made, patch((3.0, 20.0, 3.0), (1.0, 20.0, 3.0), stamp=0.0))
@@ -532,7 +532,6 @@ class TestLongLife:
         assert isinstance(loaded, GPSemanticMap)
         assert_same(*(updated(one, scan(0.0, 3, stamp=1.0)) for one in (made, loaded)))
 
-    @pytest.mark.xfail(reason="cells keep their times, and the clock begins anew", strict=True)
     def test_a_part_without_anything_goes_on_living(self, tmp_path: Path) -> None:
         part = updated(new(Forgetting(5.0)), *[scan(0.0)] * 3).crop((100, 100, 100), (101, 101, 101))
         assert len(part) == 0
@@ -633,7 +632,6 @@ class TestRefused:
         heavy = scan(labels=None, weights=np.full((2500, 2), 65.0))
         self.untouched(updated(new(Forgetting(5.0)), scan(0.0)), heavy, "64 at most")
 
-    @pytest.mark.xfail(reason="the map has faded by then", strict=True)
     def test_uncertain_positions_for_experts(self) -> None:
         model = BlockModel(resolution=EDGE, posterior="dirichlet")
         made = GPSemanticMap(TWO, model, free=FreeSpace(), forgetting=Forgetting(5.0))

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from semgp.blocks.accumulate import MASS_UNIT
+from semgp.blocks.cells import CELL, cell_origin
 from semgp.blocks.model import BlockModel
-from semgp.blocks.sites import CELL, cell_origin
 from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT, SPREAD_UNIT
+from semgp.blocks.cells import CELL
 from semgp.blocks.merging import Sums, joined, moved, stored_sums
 from semgp.blocks.model import BlockModel
-from semgp.blocks.sites import CELL
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError

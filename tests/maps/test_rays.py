@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from semgp.blocks.sites import CELL
+from semgp.blocks.cells import CELL
 from semgp.maps import rays
 from semgp.maps.rays import Walk, free_samples
 from semgp.voxels import VoxelTable, voxel_indices, voxel_keys

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from semgp.blocks.answer import Answers, answer_pairs, answer_prior, prior_probabilities
 from semgp.blocks.arrays import F32, F64, I32, I64
+from semgp.blocks.cells import CELL, cell_keys
 from semgp.blocks.covariance import mixture
 from semgp.blocks.expert_answer import answer_by_experts
 from semgp.blocks.layout import around_keys, lay_out, neighbours
 from semgp.blocks.model import CLOSED, EXPERTS, BlockModel
-from semgp.blocks.observations import Observations
+from semgp.blocks.observations import Observations, require_summable
 from semgp.blocks.pairs import CellTrees, find_pairs, home_blocks, mark_cells
-from semgp.blocks.sites import CELL, Sites
+from semgp.blocks.sites import Sites
 from semgp.blocks.solve import solve_cells
 from semgp.blocks.solved import Solved
 from semgp.blocks.store import BlockStore, sorted_by
@@ -45,11 +46,21 @@ class Field:
         self.sites = Sites(n_classes + model.other, len(model.features), model.resolution)
         self._n_classes = n_classes
         self.store = BlockStore()
+        self._changed = np.empty(0, dtype=bool)
         self._kernel = mixture(model.kernel, model.n_dims)
         self._noise, self._link = model.noise(n_classes), model.link(n_classes)
         pooled = model.posterior not in EXPERTS
         self._unknown = prior_probabilities(self._link, n_classes) if pooled else self._link.prior
         self.prior_variance = float(self._kernel.variance.sum())
+
+    def require_usable(self, given: Observations) -> None:
+        """Raise InputError for numbers beyond what a site can hold, or uncertain positions for experts."""
+        require_summable(given)
+        if given.variances is not None and self.model.posterior in EXPERTS:
+            raise InputError(
+                f"blocks of {self.model.posterior} experts take positions as certain: leave covariances out, or "
+                f"use one of {', '.join(CLOSED)}."
+            )
 
     def add(self, given: Observations) -> None:
         """Add labelled points; the blocks that they reach are solved again when next needed.
@@ -57,34 +68,50 @@ class Field:
         Raises
         ------
         InputError
-            Points a million voxels from the first, numbers beyond what a site can hold, or uncertain positions for
-            experts.
+            Points a million voxels from the first, or what `require_usable` refuses.
         """
-        if given.variances is not None and self.model.posterior in EXPERTS:
-            raise InputError(
-                f"blocks of {self.model.posterior} experts take positions as certain: leave covariances out, or "
-                f"use one of {', '.join(CLOSED)}."
-            )
-        touched = self.sites.add(given)
-        self.touch(touched)
+        self.require_usable(given)
+        self.touch(self.sites.add(given))
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Fill a new field with sites that `Sites.to_arrays` gave.
+        """Take in sites that `Sites.to_arrays` gave, of cells that have none so far.
 
         Raises
         ------
         InputError
             Sites that are damaged.
         """
-        self.sites.restore(arrays)
-        self.touch(np.arange(len(self.sites.cells), dtype=np.int32))
+        new = self.sites.restore(arrays)
+        self.store.grow(len(self.sites.cells), stale=False)
+        self.store.stale[new] = True
 
     def touch(self, cells: I32) -> None:
-        """Have cells and those round about solved again when next needed."""
-        self.store.grow(len(self.sites.cells), stale=False)
+        """Have cells that have changed, and those round about, solved again when next needed."""
+        n = len(self.sites.cells)
+        self.store.grow(n, stale=False)
         if len(cells):
             around = neighbours(self.sites, cells)
             self.store.stale[around[around >= 0]] = True
+            self._changed = np.append(self._changed, np.zeros(n - len(self._changed), dtype=bool))
+            self._changed[cells] = True
+
+    def take_changed(self) -> I64:
+        """Return the keys of the cells that were touched since this was last asked."""
+        keys = self.sites.cells.keys[np.flatnonzero(self._changed)]
+        self._changed = np.zeros(len(self.sites.cells), dtype=bool)
+        return keys
+
+    def only(self, cells: I32) -> Field:
+        """Return the field of some of the cells, with their blocks as they are."""
+        made = Field(self.model, self._n_classes)
+        chosen = self.sites.cells.keys[cells]
+        made.sites.restore(self.sites.only(np.isin(cell_keys(self.sites.voxels.keys), chosen)))
+        made.sites.origin, made.sites.clock = self.sites.origin, self.sites.clock
+        made.sites.cell_ids(chosen)
+        old = self.sites.cells.find(made.sites.cells.keys)
+        made.sites.drift[: len(old)] = self.sites.drift[old]
+        made.store = self.store.only(old)
+        return made
 
     def solve(self, cells: I32 | None = None, tolerance: float = 0.0) -> int:
         """Bring cells, all of them by default, up to date, and return how many had to be solved.

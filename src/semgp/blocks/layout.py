@@ -13,7 +13,8 @@ from numba import njit
 
 from semgp.blocks.accumulate import FEATURE_UNIT, MASS_UNIT, PLACE_UNIT, SPREAD_UNIT
 from semgp.blocks.arrays import F32, I32, I64, U32
-from semgp.blocks.sites import CELL_BITS, Sites
+from semgp.blocks.cells import CELL_BITS
+from semgp.blocks.sites import Sites
 from semgp.parallel import n_workers, parallel_map, slices
 from semgp.voxels import STEP
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from semgp.blocks.accumulate import PLACE_UNIT
 from semgp.blocks.arrays import F64, I64, U32
-from semgp.blocks.sites import cell_corner
+from semgp.blocks.cells import cell_corner
 from semgp.errors import InputError
 from semgp.voxels import EXACT, HALF_RANGE, MARGIN, STEP, VoxelTable, voxel_indices
 

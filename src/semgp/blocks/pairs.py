@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 
 from semgp.blocks.arrays import F32, F64, I8, I32, I64, Bool
+from semgp.blocks.cells import CELL, CELL_BITS
 from semgp.blocks.growing import longer, longer_rows
-from semgp.blocks.sites import CELL, CELL_BITS
 from semgp.blocks.tree import overlapped
 from semgp.voxels import AXIS_BITS, HALF_RANGE, slot_of
 

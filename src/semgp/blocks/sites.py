@@ -22,13 +22,11 @@ from semgp.blocks.accumulate import (
     fade_rows,
 )
 from semgp.blocks.arrays import F64, I32, I64, U32, Bool
+from semgp.blocks.cells import cell_keys, cell_origin
 from semgp.blocks.observations import Observations, counted
+from semgp.blocks.stored import require_sites, require_times
 from semgp.errors import InputError
-from semgp.voxels import VoxelTable, voxel_indices, voxel_keys, voxel_origin
-
-CELL_BITS = 6
-CELL = 1 << CELL_BITS
-"""Voxels along the edge of a cell."""
+from semgp.voxels import VoxelTable, voxel_indices, voxel_keys
 
 LEAST_FADED = 0.98
 """The factor from which on a cell fades."""
@@ -55,8 +53,8 @@ class Sites:
         How much each cell's sites have changed since someone set this to 0, summed over them: 1 for a new site;
         for a label added to n, (1 - its class's share + 1/2) / (n + 1), half the L1 change of the shares and half
         the growth of the mass.
-    clock : float
-        The time, for whom it matters: see `fade`.
+    clock : float or None
+        The time, for whom it matters, see `fade`; None as long as nobody has set it.
     time : (cells,) array
         When each cell was last faded, or was new.
     """
@@ -73,7 +71,7 @@ class Sites:
         self._head = np.empty(0, dtype=np.int32)
         self._size = np.empty(0, dtype=np.int32)
         self.drift, self.time = np.empty(0, dtype=np.float64), np.empty(0, dtype=np.float64)
-        self.clock = 0.0
+        self.clock: float | None = None
 
     def __len__(self) -> int:
         return len(self.voxels)
@@ -163,6 +161,7 @@ class Sites:
 
         Less than `LEAST_FADED` waits for the next time: in many small steps rounding would stop what is light.
         """
+        assert self.clock is not None
         factors = 0.5 ** ((self.clock - self.time[cells]) / half_life)
         cells, factors = cells[factors <= LEAST_FADED], factors[factors <= LEAST_FADED]
         fade_cells(cells, factors, self._head, self._next, self._mass, self._place, self._spread)
@@ -180,7 +179,7 @@ class Sites:
         self._size = _extended(self._size, len(self.cells), 0)
         self.drift = _extended(self.drift, len(self.cells), 0)
         self.time = _extended(self.time, len(self.cells), 0)
-        self.time[known : len(self.cells)] = self.clock
+        self.time[known : len(self.cells)] = self.clock or 0.0
         return ids
 
     def _grow(self) -> None:
@@ -204,7 +203,7 @@ class Sites:
         arrays = {"voxels": self.voxels.keys, "mass": self.mass, "place": self.place, "origin": origin}
         if len(self._spread):
             arrays["spread"] = self.spread
-        if self.clock:
+        if self.clock is not None:
             arrays |= {"cells": self.cells.keys, "time": np.append(self.time[: len(self.cells)], self.clock)}
         return arrays
 
@@ -213,64 +212,42 @@ class Sites:
         rows = ("voxels", "mass", "place", "spread")
         return {name: a[keep] if name in rows else a for name, a in self.to_arrays().items()}
 
-    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Fill empty sites with what `to_arrays` gave.
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> I32:
+        """Take in what `to_arrays` gave, of voxels and times of cells not met before, and return the new cells.
 
         Raises
         ------
         InputError
-            Keys out of range or twice, sites without mass or beyond their voxel, an origin within a cell.
+            Keys out of range or twice, sites without mass or beyond their voxel, an origin within a cell or
+            elsewhere than that of the sites so far. The sites are then as before.
         """
-        keys = arrays["voxels"]
-        if len(np.unique(keys)) != len(keys):
+        keys, known, cells = arrays["voxels"], len(self), len(self.cells)
+        require_sites(arrays)
+        begun = len(keys) > 0 or len(arrays.get("cells", ())) > 0
+        if begun and self.origin is not None and (arrays["origin"] != self.origin).any():
+            raise InputError("the stored sites are damaged: they do not begin where the others do.")
+        if (self.voxels.find(keys) >= 0).any():
             raise InputError("the stored sites are damaged: a voxel occurs twice.")
+        if begun:
+            self.origin = arrays["origin"]
         if "time" in arrays:
             self._restore_times(arrays["cells"], arrays["time"])
-        if not len(keys):
-            return
-        total = arrays["mass"].sum(axis=1, dtype=np.int64)
-        inside = arrays["place"][:, :3] <= total[:, None] * PLACE_UNIT
-        if (keys < 0).any() or not ((total > 0).all() and inside.all() and (arrays["place"][:, :3] >= 0).all()):
-            raise InputError(
-                "the stored sites are damaged: a voxel out of range, without mass, or left by its site."
-            )
-        if "spread" in arrays and (arrays["spread"] < 0).any():
-            raise InputError("the stored sites are damaged: a variance is negative.")
-        if (arrays["origin"] % CELL).any():
-            raise InputError("the stored sites are damaged: their origin is no corner of a cell.")
-        self.origin = arrays["origin"]
-        self.voxels.insert(keys)
-        self._grow()
-        self._mass[: len(self)], self._place[: len(self)] = arrays["mass"], arrays["place"]
-        if "spread" in arrays:
-            self._spread = arrays["spread"].copy()
-        self._link(0)
+        if len(keys):
+            self.voxels.insert(keys)
+            self._grow()
+            self._mass[known : len(self)], self._place[known : len(self)] = arrays["mass"], arrays["place"]
+            if "spread" in arrays:
+                self._spread = _extended(self._spread, len(self), 0)
+                self._spread[known : len(self)] = arrays["spread"]
+            self._link(known)
+        return np.arange(cells, len(self.cells), dtype=np.int32)
 
     def _restore_times(self, cells: I64, times: F64) -> None:
         """Take in when cells were last faded, the clock last."""
-        if not np.isfinite(times).all() or (times > times[-1]).any():
-            raise InputError("the stored sites are damaged: a time is not finite, or later than the clock.")
-        if len(np.unique(cells)) != len(cells) or (cell_keys(cells) != cells).any() or (cells < 0).any():
-            raise InputError("the stored sites are damaged: the cells that have times are none.")
-        self.clock = float(times[-1])
+        require_times(cells, times)
         ids = self.cell_ids(cells)
         self.time[ids] = times[:-1]
-
-
-def cell_origin(points: F64, resolution: float) -> I64:
-    """Return the origin (3,) of the keys of a map that begins with `points`: the corner of a cell."""
-    return cell_corner(voxel_origin(points, resolution))
-
-
-def cell_corner(voxel: I64) -> I64:
-    """Return the lowest voxel (3,) of the cell that a voxel lies in."""
-    return np.asarray(voxel >> CELL_BITS << CELL_BITS)
-
-
-def cell_keys(keys: I64) -> I64:
-    """Return the keys of the cells that voxels lie in: those of their lowest voxels."""
-    low = (1 << CELL_BITS) - 1
-    return keys & ~np.int64(low << 42 | low << 21 | low)
+        self.clock = float(times[-1]) if self.clock is None else max(self.clock, float(times[-1]))
 
 
 def _extended(a: NDArray[Any], n: int, fill: int) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -104,6 +104,18 @@ class BlockStore:
         self.next_block = int(block_at[-1])
         self.stale[cells] = False
         self._shrink_pieces()
+
+    def only(self, cells: I64) -> BlockStore:
+        """Return the blocks of some of the cells, which get new ids: their places in `cells`."""
+        made = BlockStore()
+        made.stale, made._block, made._piece = self.stale[cells], self._block[cells], self._piece[cells]
+        made._tree_at, made._leaves = self._tree_at[cells], self._leaves[cells]
+        made._axes, made._cuts, made.next_block = self._axes, self._cuts, self.next_block
+        firsts, used = np.unique(made._piece[made._piece >= 0], return_counts=True)
+        made.pieces = {f: replace(self.pieces[f], cells=n) for f, n in zip(firsts.tolist(), used.tolist())}
+        made._spare = self._spare
+        made._shrink_pieces()
+        return made
 
     def is_solved(self, cells: I32) -> Bool:
         """Return which cells have blocks, up to date or not."""

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgp.blocks.arrays import I64
+from semgp.blocks.cells import CELL, cell_origin
 from semgp.blocks.field import Field
 from semgp.blocks.inputs import cloud_inputs
 from semgp.blocks.model import BlockModel
-from semgp.blocks.observations import require_summable
-from semgp.blocks.sites import CELL, cell_origin
+from semgp.blocks.stored import stored_sites
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.forgetting import Forgetting, faint
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.occupancy import Occupancy
-from semgp.maps.settings import require_data, stored_array
+from semgp.maps.settings import require_data
 from semgp.prediction import Prediction
 from semgp.voxels import voxel_keys
 
@@ -79,15 +79,14 @@ class ManyBlocks:
         if self.occupancy is None or not len(cloud):
             self._field.add(inputs)
             return
-        require_summable(inputs)
+        self._field.require_usable(inputs)
         origin, forgetting, watched = self._origin(cloud), self.forgetting, np.empty(0, dtype=bool)
         sites, now = self._field.sites, 0.0
         if forgetting is not None:
-            begun = any(field.sites.origin is not None for field in self._fields.values())
-            now = forgetting.clock(cloud, sites.clock if begun else None)
+            now = forgetting.clock(cloud, sites.clock)
             watched = self.occupancy.occupied(sites.voxels.keys[~faint(sites)])
         rays = self.occupancy.sample(cloud, origin, watched)
-        for field in self._fields.values():
+        for field in self.fields.values():
             field.sites.origin = origin
         if forgetting is not None:
             self._forget(forgetting, np.concatenate([rays.points, inputs.points]), rays.passed, now)
@@ -96,7 +95,7 @@ class ManyBlocks:
 
     def _origin(self, cloud: LabelledCloud) -> I64:
         """Where the keys of all fields begin: passed voxels are found in each."""
-        known = [field.sites.origin for field in self._fields.values() if field.sites.origin is not None]
+        known = [field.sites.origin for field in self.fields.values() if field.sites.origin is not None]
         return known[0] if known else cell_origin(cloud.points, self.model.resolution)
 
     def _forget(self, forgetting: Forgetting, points: NDArray[np.float64], passed: I64, now: float) -> None:
@@ -105,7 +104,7 @@ class ManyBlocks:
         assert self.occupancy is not None
         assert origin is not None
         keys = voxel_keys(points, self.model.resolution, origin)
-        for field in self._fields.values():
+        for field in self.fields.values():
             forgetting.fade(field, keys, now)
         forgetting.give_up(self.occupancy.field, passed)
         forgetting.give_up(self._field, self.occupancy.mostly_free(passed))
@@ -113,16 +112,16 @@ class ManyBlocks:
 
     def _drop_faint(self) -> None:
         """Begin the fields anew without the sites that are forgotten, once those are more than half of all."""
-        for prefix, field in self._fields.items():
+        for prefix, field in self.fields.items():
             gone = faint(field.sites)
             if 2 * np.count_nonzero(gone) > len(gone):
                 self._begin(prefix, field.sites.only(~gone))
 
     def _begin(self, prefix: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Begin a field anew with stored sites."""
-        field = Field(self._fields[prefix].model, 2 if prefix else len(self.classes))
+        field = Field(self.fields[prefix].model, 2 if prefix else len(self.classes))
         field.restore(arrays)
-        field.sites.origin = self._fields[prefix].sites.origin
+        field.sites.origin = self.fields[prefix].sites.origin
         if self.occupancy is not None and prefix:
             self.occupancy.field = field
         else:
@@ -136,7 +135,7 @@ class ManyBlocks:
         InputError
             Features of another shape, or a map without labels.
         """
-        require_data(sum(len(field.sites) for field in self._fields.values()))
+        require_data(sum(len(field.sites) for field in self.fields.values()))
         F = len(self.model.features)
         if features is None:
             features = np.full((len(X), F), np.nan, dtype=np.float32)
@@ -151,14 +150,14 @@ class ManyBlocks:
 
     def solve(self) -> None:
         """Solve the blocks that are not up to date, but for the tolerance."""
-        for field in self._fields.values():
+        for field in self.fields.values():
             field.solve(tolerance=self.tolerance)
 
     def crop(self, keep: Callable[[NDArray[np.float64]], NDArray[np.bool_]]) -> ManyBlocks:
         """Return the same of the sites that `keep` selects."""
         mine = ManyBlocks(self.classes, self.model, self.free, self.forgetting)
-        for prefix, field in self._fields.items():
-            mine._fields[prefix].restore(field.sites.only(keep(field.sites.positions)))
+        for prefix, field in self.fields.items():
+            mine.fields[prefix].restore(field.sites.only(keep(field.sites.positions)))
         return mine
 
     @property
@@ -180,7 +179,7 @@ class ManyBlocks:
         """Return counts and memory: the sites' own, and what solved blocks take while they are in use."""
         return {"cell_metres": CELL * self.model.resolution} | {
             prefix.replace(".", "_") + name: value
-            for prefix, field in self._fields.items()
+            for prefix, field in self.fields.items()
             for name, value in _counts(field).items()
         }
 
@@ -190,7 +189,7 @@ class ManyBlocks:
         header = {name: None if s is None else s.to_json() for name, s in settings.items()}
         arrays = {
             prefix + name: array
-            for prefix, field in self._fields.items()
+            for prefix, field in self.fields.items()
             for name, array in field.sites.to_arrays().items()
         }
         return {"model": self.model.to_json(), **header}, arrays
@@ -211,15 +210,15 @@ class ManyBlocks:
             None if free is None else FreeSpace.from_json(free),
             None if forgetting is None else Forgetting.from_json(forgetting),
         )
-        for prefix, field in made._fields.items():
-            field.restore(_stored_sites(arrays, prefix, field))
-        origins = [f.sites.origin for f in made._fields.values() if f.sites.origin is not None]
+        for prefix, field in made.fields.items():
+            field.restore(stored_sites(arrays, prefix, field.sites.mass.shape[1], field.model.n_dims))
+        origins = [f.sites.origin for f in made.fields.values() if f.sites.origin is not None]
         if any((origin != origins[0]).any() for origin in origins):
             raise InputError("the stored fields of labels and of free space do not begin at one voxel: damaged.")
         return made
 
     @property
-    def _fields(self) -> dict[str, Field]:
+    def fields(self) -> dict[str, Field]:
         """The fields, by the prefix of their stored arrays."""
         return {"": self._field} | ({} if self.occupancy is None else {"free.": self.occupancy.field})
 
@@ -235,20 +234,3 @@ def _counts(field: Field) -> dict[str, Any]:
         "bytes_a_site": round(sites.n_bytes / max(len(sites), 1), 1),
         "solved_bytes": store.n_bytes,
     }
-
-
-def _stored_sites(arrays: Mapping[str, NDArray[Any]], prefix: str, field: Field) -> dict[str, NDArray[Any]]:
-    """The stored arrays of a field's sites, checked."""
-    n = len(stored_array(arrays, prefix + "voxels", np.int64, (None,)))
-    shapes: dict[str, tuple[type[np.generic], tuple[int | None, ...]]] = {
-        "voxels": (np.int64, (n,)),
-        "mass": (np.uint32, (n, field.sites.mass.shape[1])),
-        "place": (np.int64, (n, field.model.n_dims)),
-        "origin": (np.int64, (3,)),
-    }
-    if prefix + "spread" in arrays:
-        shapes["spread"] = (np.int64, (n, 4))
-    if prefix + "time" in arrays:
-        cells = len(stored_array(arrays, prefix + "cells", np.int64, (None,)))
-        shapes |= {"cells": (np.int64, (cells,)), "time": (np.float64, (cells + 1,))}
-    return {name: stored_array(arrays, prefix + name, *wanted) for name, wanted in shapes.items()}

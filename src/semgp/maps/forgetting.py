@@ -10,8 +10,9 @@ import numpy as np
 
 from semgp.blocks.accumulate import MASS_UNIT
 from semgp.blocks.arrays import I64, Bool
+from semgp.blocks.cells import cell_keys
 from semgp.blocks.field import Field
-from semgp.blocks.sites import Sites, cell_keys
+from semgp.blocks.sites import Sites
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.maps.settings import require_positive
