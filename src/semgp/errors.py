@@ -40,3 +40,7 @@ class MissingExtraError(SemgpError, ImportError):
 
     def __init__(self, feature: str, extra: str) -> None:
         super().__init__(f"{feature} needs an optional dependency: pip install 'semgp[{extra}]'")
+
+
+class ConflictError(SemgpError):
+    """Another writer was faster: what was to be written is still there, to be merged or written anew."""

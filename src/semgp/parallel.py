@@ -16,8 +16,15 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
+THREADS_VARIABLE = "SEMGP_THREADS"
+"""The environment variable that says how many threads a process may use, where that is not one a core."""
+
+
 def n_workers() -> int:
-    """Return the number of processor cores that this process may use."""
+    """Return the number of threads for this process: what `SEMGP_THREADS` says, or the cores that it may use."""
+    wanted = os.environ.get(THREADS_VARIABLE, "")
+    if wanted.isdecimal() and int(wanted) > 0:
+        return int(wanted)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -15,7 +15,8 @@ from semgp.blocks.cells import cell_corner
 from semgp.errors import InputError
 from semgp.voxels import EXACT, HALF_RANGE, MARGIN, STEP, VoxelTable, voxel_indices
 
-_MOST = (1 << 32) - 1  # the mass that a site can hold, a million labels
+MOST_MASS = (1 << 32) - 1
+"""The mass that a site can hold: a million labels."""
 
 
 class Sums(NamedTuple):
@@ -133,7 +134,7 @@ def _add(rows: I64, m: U32, p: I64, s: I64, mass: U32, place: I64, spread: I64) 
         for c in range(mass.shape[1]):
             before += np.int64(mass[r, c])
             more += np.int64(m[i, c])
-        if before + more > _MOST:
+        if before + more > MOST_MASS:
             if more <= before:
                 continue
             mass[r : r + 1], place[r : r + 1], spread[r : r + 1] = 0, 0, 0

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from semgp.blocks.arrays import I64
+from semgp.blocks.arrays import I64, Bool
 from semgp.blocks.cells import CELL, cell_origin
 from semgp.blocks.field import Field
 from semgp.blocks.inputs import cloud_inputs
@@ -20,8 +20,8 @@ from semgp.errors import InputError
 from semgp.maps.forgetting import Forgetting, faint
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.occupancy import Occupancy
-from semgp.maps.settings import require_data
-from semgp.prediction import Prediction
+from semgp.maps.protocol import NO_FREE_SPACE
+from semgp.prediction import OccupancyPrediction, Prediction
 from semgp.voxels import voxel_keys
 
 UNEXPLAINED = 0.95
@@ -95,8 +95,7 @@ class ManyBlocks:
 
     def _origin(self, cloud: LabelledCloud) -> I64:
         """Where the keys of all fields begin: passed voxels are found in each."""
-        known = [field.sites.origin for field in self.fields.values() if field.sites.origin is not None]
-        return known[0] if known else cell_origin(cloud.points, self.model.resolution)
+        return cell_origin(cloud.points, self.model.resolution) if self.origin is None else self.origin
 
     def _forget(self, forgetting: Forgetting, points: NDArray[np.float64], passed: I64, now: float) -> None:
         """Fade what a cloud comes near, and what its rays pass through."""
@@ -118,14 +117,39 @@ class ManyBlocks:
                 self._begin(prefix, field.sites.only(~gone))
 
     def _begin(self, prefix: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Begin a field anew with stored sites."""
-        field = Field(self.fields[prefix].model, 2 if prefix else len(self.classes))
+        """Begin a field anew with stored sites of the same cells."""
+        old = self.fields[prefix]
+        field = Field(old.model, 2 if prefix else len(self.classes))
+        field.sites.origin, field.sites.clock = old.sites.origin, old.sites.clock
         field.restore(arrays)
-        field.sites.origin = self.fields[prefix].sites.origin
+        field.touch(np.arange(len(field.sites.cells), dtype=np.int32))
+        self._put(prefix, field)
+
+    @property
+    def clock(self) -> float | None:
+        """The time, for maps that forget; None before the first cloud."""
+        return self._field.sites.clock
+
+    def _put(self, prefix: str, field: Field) -> None:
         if self.occupancy is not None and prefix:
             self.occupancy.field = field
         else:
             self._field = field
+
+    def keep_cells(self, keep: Callable[[I64], Bool]) -> None:
+        """Drop the cells whose keys `keep` does not select, with all that they hold."""
+        for prefix, field in self.fields.items():
+            self._put(prefix, field.only(np.flatnonzero(keep(field.sites.cells.keys)).astype(np.int32)))
+
+    def begin(self, origin: I64, clock: float | None) -> None:
+        """Set where the keys of an empty map begin, and its time."""
+        for field in self.fields.values():
+            field.sites.origin, field.sites.clock = origin, clock
+
+    @property
+    def origin(self) -> I64 | None:
+        """The voxel (3,) where the keys of all fields begin, None as long as nothing is known."""
+        return next((f.sites.origin for f in self.fields.values() if f.sites.origin is not None), None)
 
     def answer(self, X: NDArray[np.float64], features: NDArray[np.float32] | None) -> Prediction:
         """Answer at points (M, 3) with features (M, F), NaN where unknown, or None for all unknown.
@@ -133,9 +157,8 @@ class ManyBlocks:
         Raises
         ------
         InputError
-            Features of another shape, or a map without labels.
+            Features of another shape.
         """
-        require_data(sum(len(field.sites) for field in self.fields.values()))
         F = len(self.model.features)
         if features is None:
             features = np.full((len(X), F), np.nan, dtype=np.float32)
@@ -145,8 +168,20 @@ class ManyBlocks:
         # one covariance for all classes has one variance for all of them
         variance = np.broadcast_to(answers.variance[:, None], answers.probability.shape)
         observed = answers.variance < UNEXPLAINED * self._field.prior_variance
-        occupancy = None if self.occupancy is None else self.occupancy.answer(X, self.tolerance)
+        occupancy = None if self.occupancy is None else self.occupancy_at(X)
         return Prediction(self.classes, answers.probability, observed, variance=variance, occupancy=occupancy)
+
+    def occupancy_at(self, X: NDArray[np.float64]) -> OccupancyPrediction:
+        """Answer whether something is there, at points (M, 3).
+
+        Raises
+        ------
+        InputError
+            A map that keeps no free space.
+        """
+        if self.occupancy is None:
+            raise InputError(NO_FREE_SPACE)
+        return self.occupancy.answer(X, self.tolerance)
 
     def solve(self) -> None:
         """Solve the blocks that are not up to date, but for the tolerance."""
@@ -174,6 +209,11 @@ class ManyBlocks:
     def __len__(self) -> int:
         """Return the number of sites."""
         return len(self._field.sites)
+
+    @property
+    def n_known(self) -> int:
+        """Number of sites of labels and of free space."""
+        return sum(len(field.sites) for field in self.fields.values())
 
     def info(self) -> dict[str, Any]:
         """Return counts and memory: the sites' own, and what solved blocks take while they are in use."""

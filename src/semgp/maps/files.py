@@ -11,21 +11,23 @@ import numpy as np
 from semgp.classes import Classes
 from semgp.errors import FileFormatError, InputError
 from semgp.maps.kinds import MAP_KINDS
-from semgp.maps.protocol import SemanticMap
+from semgp.maps.protocol import SemanticMap, SerialisableMap
 from semgp.readers.npz import read_arrays
+from semgp.store import StoredMap
+from semgp.store.bucket import as_url
 from semgp.writers import atomic_write
 
 FORMAT = "semgp-map"
 VERSION = 1
 
 
-def save_map(semantic_map: SemanticMap, path: str | Path) -> None:
+def save_map(semantic_map: SerialisableMap, path: str | Path) -> None:
     """Write a map to a file, whole or not at all.
 
     Parameters
     ----------
-    semantic_map : SemanticMap
-        Any map.
+    semantic_map : SerialisableMap
+        Any map but a stored one, which is on disk already.
     path : str or Path
         The file, by custom `*.semgp`, replaced where it exists.
     """
@@ -45,13 +47,21 @@ def save_map(semantic_map: SemanticMap, path: str | Path) -> None:
 
 
 def load_map(path: str | Path) -> SemanticMap:
-    """Read a map from a file that `save_map` wrote.
+    """Open a map: a file that `save_map` wrote, or a store, which is read as far as it is asked.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, the folder of a `StoredMap`, or its URL.
 
     Raises
     ------
     FileFormatError
-        A file that is missing, damaged, no map of semgp, or written by a newer version.
+        A file that is missing, damaged, no map of semgp, or written by a newer version; InputError for a folder
+        without a map.
     """
+    if as_url(path) is not None or Path(path).is_dir():
+        return StoredMap(path)
     path = Path(path)
     arrays = read_arrays(path)
     if "header" not in arrays:

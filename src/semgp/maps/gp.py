@@ -20,6 +20,7 @@ from semgp.maps.free_space import FreeSpace
 from semgp.maps.occupancy import FREE, OCCUPIED, Occupancy
 from semgp.maps.presets import GENERAL
 from semgp.maps.protocol import NO_FREE_SPACE, query_points, require_classes
+from semgp.maps.settings import require_data
 from semgp.maps.whole import WholeScan
 from semgp.prediction import OccupancyPrediction, Prediction
 
@@ -104,6 +105,7 @@ class GPSemanticMap:
         InputError
             Points or features that cannot be used, or a map without a single labelled point.
         """
+        require_data(self._state.n_known)
         known = None if features is None else np.ascontiguousarray(features, dtype=np.float32)
         return self._state.answer(query_points(points), known)
 
@@ -131,11 +133,7 @@ class GPSemanticMap:
         InputError
             Corners that are not three numbers each, or not in order.
         """
-        a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
-            raise InputError(
-                f"a box needs two corners (3,), each below the other, not {a.tolist()} and {b.tolist()}."
-            )
+        a, b = box(low, high)
         part = GPSemanticMap(self.classes, self.model)
         part._state = self._state.crop(lambda X: np.asarray(((a <= X) & (b > X)).all(axis=1)))
         return part
@@ -219,6 +217,20 @@ class GPSemanticMap:
         made = cls(classes, state.model)
         made._state = state
         return made
+
+
+def box(low: ArrayLike, high: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Check the corners of a box and return them as float64, shape (3,) each.
+
+    Raises
+    ------
+    InputError
+        Corners that are not three numbers each, or not in order.
+    """
+    a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    if a.shape != (3,) or b.shape != (3,) or not (a < b).all():
+        raise InputError(f"a box needs two corners (3,), each below the other, not {a.tolist()} and {b.tolist()}.")
+    return a, b
 
 
 def _state(

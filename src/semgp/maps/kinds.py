@@ -4,10 +4,10 @@ from semgp.baselines.bki import BKIMap
 from semgp.baselines.csm import CSMMap
 from semgp.baselines.knn import KNNMap
 from semgp.maps.gp import GPSemanticMap
-from semgp.maps.protocol import SemanticMap
+from semgp.maps.protocol import SerialisableMap
 from semgp.octomap import SemanticOctoMap
 
-MAP_KINDS: dict[str, type[SemanticMap]] = {
+MAP_KINDS: dict[str, type[SerialisableMap]] = {
     "gp": GPSemanticMap,
     "octomap": SemanticOctoMap,
     "knn": KNNMap,

@@ -44,6 +44,11 @@ class SemanticMap(Protocol):
         """Return settings, counts and memory figures, ready for JSON."""
         ...
 
+
+@runtime_checkable
+class SerialisableMap(SemanticMap, Protocol):
+    """A semantic map that is plain arrays: what map files hold."""
+
     def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Return a header ready for JSON and plain arrays from which `from_arrays` makes the same map."""
         ...

@@ -105,6 +105,11 @@ class WholeScan:
     def __len__(self) -> int:
         return len(self._points)
 
+    @property
+    def n_known(self) -> int:
+        """Number of points."""
+        return len(self)
+
     def info(self) -> dict[str, Any]:
         """Return counts, convergence and memory."""
         names = self.classes.names

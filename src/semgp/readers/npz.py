@@ -12,6 +12,10 @@ The arrays of a file; all but `points` may be left out:
 `features`        (N, F) float    further inputs
 `feature_names`   (F,) text       their names
 `T_world_sensor`  (4, 4) float    pose of the sensor
+`confidence`      (N,) float      how much each label counts, 0 to 1
+`covariances`     (N, 3, 3) float of each position, m^2
+`pose_covariance` (6, 6) float    of the pose
+`stamp`           () float        when the cloud was taken, seconds
 `pixels`          (N, 2) integer  row and column in the image
 `image_shape`     (2,) integer    rows and columns of the image
 ================= =============== ===================================================
@@ -43,6 +47,7 @@ from semgp.readers.fields import numbered_classes
 
 KINDS = {
     **{"points": "fiu", "labels": "iu", "weights": "fiu", "names": "U", "palette": "u", "colours": "u"},
+    **{"confidence": "fiu", "covariances": "fiu", "pose_covariance": "fiu", "stamp": "fiu"},
     **{"features": "fiu", "feature_names": "U", "T_world_sensor": "fiu", "pixels": "iu", "image_shape": "iu"},
 }
 """Kinds of numpy type that each array of the layout may have."""
@@ -80,6 +85,8 @@ def read_npz(path: str | Path, *, classes: Classes | None = None) -> LabelledClo
         if array.dtype.kind not in KINDS[name]:
             raise FileFormatError(path, f"has {name} of the wrong type {array.dtype}.")
     try:
+        if classes is not None and "labels" in arrays:
+            arrays["labels"] = classes.from_ids(arrays["labels"])
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the cloud refuses
             return _cloud(arrays, classes or _classes(path, arrays))
     except InputError as error:
@@ -99,7 +106,7 @@ def read_arrays(path: Path, names: Collection[str] | None = None) -> dict[str, N
             stored = [member.removesuffix(".npy") for member in archive.namelist()]
             wanted = stored if names is None else [name for name in names if name in stored]
             _refuse_bombs(path, archive)
-            return {name: _read_npy(archive.read(f"{name}.npy")) for name in wanted}
+            return {name: read_npy(archive.read(f"{name}.npy")) for name in wanted}
     except FileNotFoundError as error:
         raise FileFormatError(path, "no such file.") from error
     except DAMAGE as error:
@@ -113,7 +120,7 @@ def _refuse_bombs(path: Path, archive: zipfile.ZipFile) -> None:
         raise FileFormatError(path, f"would unpack to {unpacked:,} bytes: refused as a decompression bomb.")
 
 
-def _read_npy(raw: bytes) -> NDArray[Any]:
+def read_npy(raw: bytes) -> NDArray[Any]:
     """Return the array in a .npy file; unlike numpy, believe no header that does not fit the bytes behind it."""
     stream = io.BytesIO(raw)
     version = npy.read_magic(stream)
@@ -144,6 +151,8 @@ def _cloud(arrays: dict[str, NDArray[Any]], classes: Classes) -> LabelledCloud:
     image_shape = arrays["image_shape"].tolist() if "image_shape" in arrays else None
     if image_shape is not None and np.shape(image_shape) != (2,):
         raise InputError("image_shape must be two numbers, rows and columns.")
+    if (stamp := arrays.get("stamp")) is not None and stamp.shape != ():
+        raise InputError("stamp must be one number, the time in seconds.")
     return LabelledCloud(
         points=arrays["points"],
         classes=classes,
@@ -153,6 +162,10 @@ def _cloud(arrays: dict[str, NDArray[Any]], classes: Classes) -> LabelledCloud:
         features=arrays.get("features"),
         feature_names=tuple(np.ravel(arrays.get("feature_names", ())).tolist()),
         T_world_sensor=arrays.get("T_world_sensor"),
+        confidence=arrays.get("confidence"),
+        covariances=arrays.get("covariances"),
+        pose_covariance=arrays.get("pose_covariance"),
+        stamp=None if stamp is None else float(stamp),
         pixels=arrays.get("pixels"),
         image_shape=None if image_shape is None else (image_shape[0], image_shape[1]),
     )
