@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 
 SHAPE = (24, 32)
@@ -75,6 +76,41 @@ def write_nyu_mat(folder: Path) -> Path:
         for k, name in enumerate(RAW_NAMES):
             text = file.create_dataset(f"#refs#/{k}", data=np.array([[ord(c)] for c in name], np.uint16))
             references[0, k] = text.ref
+    return path
+
+
+def write_log(folder: Path) -> Path:
+    """Write a ROS 2 bag of three clouds of a lidar that moves."""
+    from semgp.logs.recording import write_clouds
+
+    rng = np.random.default_rng(6)
+    poses = [np.block([[np.eye(3), np.full((3, 1), step)], [np.zeros((1, 3)), 1]]) for step in range(3)]
+    clouds = [
+        LabelledCloud(
+            rng.normal(size=(20, 3)), Classes(("road", "car")), rng.integers(-1, 2, 20), T_world_sensor=T
+        )
+        for T in poses
+    ]
+    write_clouds(folder / "run.mcap", clouds)
+    return folder / "run.mcap"
+
+
+def write_kitti_bin(folder: Path) -> Path:
+    """Write one scan of 40 points by itself, with its labels beside it."""
+    rng = np.random.default_rng(7)
+    rng.uniform(-20, 20, (40, 4)).astype("<f4").tofile(folder / "000007.bin")
+    rng.choice([0, 10, 40, 252], 40).astype("<u4").tofile(folder / "000007.label")
+    return folder / "000007.bin"
+
+
+def write_point_folder(folder: Path) -> Path:
+    """Write three PCD files, named 9, 10 and 11, of 9, 10 and 11 points."""
+    path = folder / "pieces"
+    path.mkdir()
+    rng = np.random.default_rng(8)
+    for n in (9, 10, 11):
+        cloud = LabelledCloud(rng.normal(size=(n, 3)), Classes.numbered(3), rng.integers(0, 3, n, np.int32))
+        write_pcd(path / f"{n}.pcd", cloud, "binary")
     return path
 
 

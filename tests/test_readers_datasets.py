@@ -70,9 +70,9 @@ def test_nyu_folder_against_a_loop(tmp_path: Path) -> None:
 
 
 def test_nyu_depth_65535_is_no_depth_at_any_range(tmp_path: Path) -> None:
-    from semgp.readers.images import read_depth_mm
+    from semgp.readers.images import read_depth
 
-    depth = read_depth_mm(write_nyu_folder(tmp_path) / "0012_depth_mm.png")
+    depth = read_depth(write_nyu_folder(tmp_path) / "0012_depth_mm.png")
     np.testing.assert_array_equal(np.isnan(depth[0, :4]), [True, True, False, False])
     assert depth[0, 2] == 10.001
 
@@ -151,7 +151,7 @@ def test_nyu_images_that_are_refused(tmp_path: Path) -> None:
         (folder / name).write_bytes(whole)
 
     refused("0007_label13.png", np.full(SHAPE, 14, np.uint8), "between 0 and 13")
-    refused("0007_label13.png", np.zeros((3, 4), np.uint8), "like the depth")
+    refused("0007_label13.png", np.zeros((3, 4), np.uint8), "are expected")
     refused("0007_depth_mm.png", np.zeros(SHAPE, np.uint8), "no 16-bit depth image")
     refused("0007_rgb.jpg", np.zeros(SHAPE, np.uint8), "no RGB image")
 

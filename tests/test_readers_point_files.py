@@ -1,5 +1,6 @@
 """PLY, PCD and npz: what is written is read again, and what is wrong is said."""
 
+import contextlib
 import io
 import struct
 import zipfile
@@ -16,7 +17,9 @@ from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
 from semgp.readers import read, read_npz, read_pcd, read_ply
-from semgp.writers import atomic_write, write_npz, write_ply
+from semgp.readers.lzf import unpacked
+from semgp.writers import write_npz, write_ply
+from tests.point_samples import Damage, damages, lzf_packed, survives
 from tests.reader_samples import write_pcd
 
 CLASSES = Classes(("floor mat", "wall", "überall"), ((1, 2, 3), (4, 5, 6), (250, 251, 252)))
@@ -230,10 +233,10 @@ def test_ply_comments_of_others_are_passed_over(tmp_path: Path) -> None:
         ({"label": [2**31, 0, 0]}, "32 bits"),
         ({"label": ["a", "b", "c"]}, "numbers"),
         ({"two words": [1, 2, 3]}, "cannot name"),
-        ({"x": [1, 2, 3]}, "two properties .* x"),
+        ({"x": [1, 2, 3]}, "two fields .* x"),
         ({"probability": np.ones((3, 2))}, "needs classes"),
         ({"probability": np.ones((3, 2)), "classes": CLASSES}, "shape"),
-        ({"probability": np.ones((3, 2)), "classes": Classes(("a b", "a_b"))}, "two properties .* p_a_b"),
+        ({"probability": np.ones((3, 2)), "classes": Classes(("a b", "a_b"))}, "two fields .* p_a_b"),
         ({"classes": Classes(("a\nb",))}, "cannot hold"),
         ({"classes": Classes(("",))}, "cannot hold"),
     ],
@@ -277,6 +280,60 @@ def test_pcd_with_colours_padding_and_vectors(tmp_path: Path) -> None:
     np.testing.assert_array_equal(cloud.features, [[0, 1]])
 
 
+COLUMNS = (np.arange(600) % 7, np.arange(600) // 100, np.zeros(600))
+
+
+def compressed_pcd(path: Path, size: int | None = None, cut: int = 0) -> Path:
+    raw = b"".join(column.astype("<f4").tobytes() for column in COLUMNS)
+    packed = lzf_packed(raw)
+    header = pcd_header(WIDTH="600", POINTS="600", DATA="binary_compressed")
+    sizes = struct.pack("<II", len(packed), len(raw) if size is None else size)
+    path.write_bytes(header.encode() + sizes + packed[: len(packed) - cut])
+    return path
+
+
+def test_pcd_compressed(tmp_path: Path) -> None:
+    path = compressed_pcd(tmp_path / "a.pcd")
+    assert path.stat().st_size < 4000
+    np.testing.assert_array_equal(read(path).points, np.stack(COLUMNS, axis=1))
+
+
+@pytest.mark.parametrize(("size", "cut"), [(7199, 0), (2**32 - 1, 0), (None, 1), (None, 200)])
+def test_pcd_compressed_that_lies(size: int | None, cut: int, tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=r"is truncated|damaged"):
+        read(compressed_pcd(tmp_path / "a.pcd", size, cut))
+
+
+def test_pcd_compressed_bomb(tmp_path: Path) -> None:
+    header = pcd_header(WIDTH="1", POINTS="350000000", DATA="binary_compressed")
+    body = struct.pack("<II", 3, 4_200_000_000 % 2**32) + b"\x00\x00\x00"
+    (tmp_path / "a.pcd").write_bytes(header.encode() + body)
+    with pytest.raises(FileFormatError, match="3 bytes cannot unpack to 4200000000"):
+        read(tmp_path / "a.pcd")
+
+
+@pytest.fixture(scope="module")
+def compressed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return compressed_pcd(tmp_path_factory.mktemp("pcd") / "a.pcd").read_bytes()
+
+
+@tmp_path_is_fine
+@given(damage=damages)
+def test_pcd_compressed_and_damaged(damage: Damage, compressed: bytes, tmp_path: Path) -> None:
+    survives(tmp_path / "a.pcd", compressed, damage)
+
+
+@given(raw=st.binary(max_size=400) | st.lists(st.sampled_from([b"ab", b"abc", b"\0" * 40])).map(b"".join))
+def test_lzf_round_trip(raw: bytes) -> None:
+    assert unpacked(Path("a.pcd"), lzf_packed(raw), len(raw)).tobytes() == raw
+
+
+@given(packed=st.binary(max_size=60), size=st.integers(0, 300))
+def test_lzf_of_noise(packed: bytes, size: int) -> None:
+    with contextlib.suppress(FileFormatError):
+        assert len(unpacked(Path("a.pcd"), packed, size)) == size
+
+
 def pcd_header(**changes: str) -> str:
     lines = {"FIELDS": "x y z", "SIZE": "4 4 4", "TYPE": "F F F", "COUNT": "1 1 1", "WIDTH": "1", "HEIGHT": "1"}
     lines |= {"POINTS": "1", "DATA": "ascii"} | changes
@@ -287,8 +344,8 @@ def pcd_header(**changes: str) -> str:
     ("changes", "message"),
     [
         ({"FIELDS": "x y w"}, "has no z; its fields are x, y, w"),
-        ({"DATA": "binary_compressed"}, "not supported yet"),
-        ({"DATA": "morse"}, "known are ascii and binary"),
+        ({"DATA": "binary_compressed"}, "is truncated or its header lies"),
+        ({"DATA": "morse"}, "known are ascii, binary and binary_compressed"),
         ({"SIZE": "4 4"}, "different lengths"),
         ({"SIZE": "4 4 3"}, "unknown type and size F3"),
         ({"TYPE": ""}, "without TYPE"),
@@ -335,14 +392,19 @@ def test_npz_round_trip(n: int, soft: bool, rich: bool, seed: int, tmp_path: Pat
             "features": rng.normal(size=(n, 2)).astype(np.float32),
             "feature_names": ("intensity", "height above ground"),
             "T_world_sensor": np.array([[0, -1, 0, 5e6], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]]),
+            "confidence": rng.random(n, np.float32),
+            "covariances": np.tile(np.diag([1e-4, 1e-4, 4e-4]), (n, 1, 1)),
+            "pose_covariance": np.diag([1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6]),
+            "stamp": 1_700_000_000.123456,
             "pixels": rng.integers(0, 100, (n, 2), np.int32),
             "image_shape": (100, 100),
         }
     labels = {"weights": rng.random((n, 3), np.float32)} if soft else {"labels": rng.integers(-1, 3, n, np.int32)}
     cloud = LabelledCloud(rng.normal(scale=1e6, size=(n, 3)), CLASSES, **labels, **extras)
-    write_npz(tmp_path / "a.npz", cloud, confidence=np.ones(n))
+    write_npz(tmp_path / "a.npz", cloud, entropy=np.ones(n))
     again = read(tmp_path / "a.npz")
-    for field in ("points", "labels", "weights", "colours", "features", "T_world_sensor", "pixels"):
+    parts = ("points", "labels", "weights", "colours", "features", "T_world_sensor", "pixels")
+    for field in (*parts, "confidence", "covariances", "pose_covariance"):
         expected, found = getattr(cloud, field), getattr(again, field)
         assert (expected is None) == (found is None)
         if expected is not None:
@@ -350,6 +412,7 @@ def test_npz_round_trip(n: int, soft: bool, rich: bool, seed: int, tmp_path: Pat
             assert found.dtype == expected.dtype
     assert again.classes == CLASSES
     assert (again.feature_names, again.image_shape) == (cloud.feature_names, cloud.image_shape)
+    assert again.stamp == cloud.stamp
 
 
 def test_npz_needs_points_only(tmp_path: Path) -> None:
@@ -380,6 +443,11 @@ def test_npz_needs_points_only(tmp_path: Path) -> None:
         ({"points": POINTS, "names": [["a", "b"]]}, "names of shape"),
         ({"points": POINTS, "weights": np.full((3, 2), 1e300)}, "weights has NaN or infinite"),
         ({"points": POINTS, "image_shape": [1, 2, 3]}, "image_shape"),
+        ({"points": POINTS, "stamp": [1.0, 2.0]}, "stamp must be one number"),
+        ({"points": POINTS, "stamp": np.nan}, "stamp must be a time"),
+        ({"points": POINTS, "confidence": [0.5, 2, 1]}, "between 0"),
+        ({"points": POINTS, "covariances": np.full((3, 3, 3), -1.0)}, "eigenvalues"),
+        ({"points": POINTS, "pose_covariance": np.eye(6)}, "needs T_world_sensor"),
         ({"points": POINTS, "T_world_sensor": np.ones((4, 4))}, "rigid"),
         ({"points": np.array([[{}, 1, 2]], dtype=object)}, "Python objects"),
     ],
@@ -428,37 +496,3 @@ def test_write_npz_refuses(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="Python objects"):
         write_npz(tmp_path / "a.npz", cloud, thing=np.array([{}], dtype=object))
     assert list(tmp_path.iterdir()) == []
-
-
-# ---------------------------------------------------------------- atomic writing
-
-
-def test_atomic_write_replaces_whole(tmp_path: Path) -> None:
-    path = tmp_path / "map.npz"
-    path.write_text("old")
-    with atomic_write(path) as temporary:
-        temporary.write_text("new")
-        assert path.read_text() == "old"
-        assert (temporary.parent, temporary.suffix) == (tmp_path, ".npz")
-    assert path.read_text() == "new"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_atomic_write_keeps_the_old_file_after_an_error(tmp_path: Path) -> None:
-    path = tmp_path / "map.npz"
-    path.write_text("old")
-
-    def write_half() -> None:
-        with atomic_write(path) as temporary:
-            temporary.write_text("half")
-            raise RuntimeError("power cut")
-
-    with pytest.raises(RuntimeError, match="power cut"):
-        write_half()
-    assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_atomic_write_into_no_folder(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="does not exist"), atomic_write(tmp_path / "no" / "a.ply"):
-        pass

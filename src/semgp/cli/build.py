@@ -1,35 +1,36 @@
-"""`semgp build` and `semgp learn`: scans to a map, and scans to the model of one."""
+"""`semgp build` and `semgp update`: scans to a map, and more scans into it."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
+from cyclopts import Parameter
 from rich.progress import Progress
 
-from semgp.blocks.learning import learn_from_scans
 from semgp.blocks.model import BlockModel
-from semgp.cli.console import STDOUT, progress
-from semgp.cloud import LabelledCloud
-from semgp.errors import FileFormatError, InputError
+from semgp.cli.console import keeping, progress, report
+from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources, tell_dropped
+from semgp.cli.learn import PAPER, SAMPLE, Axis, block_model, learn_blocks, learn_paper
+from semgp.errors import InputError
+from semgp.executors import open_executor
 from semgp.gp.model import GPModel
-from semgp.maps.files import save_map
+from semgp.maps.files import is_file_name, load_map, save_map
 from semgp.maps.forgetting import Forgetting
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.kinds import MAP_KINDS
-from semgp.maps.learning import learn_model
-from semgp.maps.presets import PRESETS, with_vertical
-from semgp.maps.protocol import SemanticMap
-from semgp.readers import open_scans
-from semgp.writers import atomic_write
+from semgp.maps.presets import PRESETS
+from semgp.maps.protocol import SerialisableMap
+from semgp.readers import Scans
+from semgp.store import BATCH, MapStore, Settings, StoredMap
+from semgp.store import build as build_stored
 
 Kind = Literal["gp", "octomap", "knn", "csm", "bki"]
-Axis = Literal["x", "y", "z"]
-PAPER = "paper"
+Workers = Annotated[Literal["threads", "ray"], Parameter(group="Many machines")]
+Address = Annotated[str | None, Parameter(group="Many machines")]
+Count = Annotated[int | None, Parameter(group="Many machines")]
+PaperNumber = Annotated[int, Parameter(group="The paper's GP")]
 
 
 def build(
@@ -37,6 +38,7 @@ def build(
     /,
     *,
     out: Path,
+    inputs: AnyInputs = PLAIN,
     kind: Kind = "gp",
     model: str = "general",
     resolution: float | None = None,
@@ -44,26 +46,33 @@ def build(
     learn: bool = True,
     free_space: bool = False,
     half_life: float | None = None,
-    max_points: int = 5000,
-    inducing: int = 300,
-    iterations: int = 30,
+    resume: Annotated[bool, Parameter(negative="")] = False,
+    executor: Workers = "threads",
+    workers: Count = None,
+    address: Address = None,
+    max_points: PaperNumber = 5000,
+    inducing: PaperNumber = 300,
+    iterations: PaperNumber = 30,
     seed: int = 0,
-    quiet: bool = False,
 ) -> None:
-    """Build a map from labelled scans and write it to a file.
+    """Build a map from labelled scans, as one file or as a store that grows.
 
     Example: semgp build room.ply --out room.semgp
 
-    Example: semgp build sequences/08 --model outdoor-lidar --out drive.semgp
+    Example: semgp build sequences/08 --model outdoor-lidar --out drive
 
     Example: semgp build sequences/08 --model outdoor-lidar --half-life 30 --out drive.semgp
+
+    Example: semgp build sequences/08 --model outdoor-lidar --executor ray --out s3://maps/drive
 
     Parameters
     ----------
     scans
-        Point files (.ply, .pcd, .npz) or data-set folders; labels of -1 are missing.
+        Point files, RGB-D recordings, robot logs or data-set folders; labels of -1 are missing.
     out
-        The map file to write.
+        The map to write. A name that ends in .semgp is one file, written at the end. Any other is a store: a
+        folder, or a URL such as s3://bucket/drive, with a version every few scans; what has been published stays
+        whatever happens, and the map may be larger than memory.
     kind
         The method: the Gaussian-process map, the semantic OctoMap, or a baseline.
     model
@@ -75,133 +84,174 @@ def build(
         The axis of gravity in the scans' world.
     learn
         With two scans or more, learn the model from their labels, from the preset on; a model file is taken as it
-        is. The paper's GP learns from the first scan.
+        is. Of long sequences, 20 scans from the middle teach it, five apart. The paper's GP learns from the first
+        scan.
     free_space
         The GP keeps free space, too, from the rays of scans with a pose: "semgp query" then says what is occupied,
         and "semgp surface" and "semgp slice" have something to work on.
     half_life
         Keep free space and forget: labels lose half their weight in so many scans, and what rays pass through is
         given up.
+    resume
+        Go on with a store whose build was interrupted: with the scan after the last one that it holds.
+    executor
+        Who does the work of a store: the threads of this process, or a Ray cluster.
+    workers
+        How many at a time; one for each core by default.
+    address
+        Address of a Ray cluster, "auto" for the one this machine belongs to; left out, one is started here.
     max_points
-        The paper's GP: at most so many labelled points, drawn at random, train it.
+        At most so many labelled points, drawn at random, train it.
     inducing
-        The paper's GP: inducing points.
+        Inducing points.
     iterations
-        The paper's GP: limit of learning steps.
+        Limit of learning steps.
     seed
         Seed of every random draw.
-    quiet
-        Show no progress.
     """
     if (free_space or half_life is not None) and (kind != "gp" or model == PAPER):
         raise InputError("--free-space and --half-life are for the GP map of many blocks: leave them out.")
-    sources = _sources(scans)
-    with progress(quiet) as bars:
-        semantic_map: SemanticMap
+    one_file = is_file_name(out)
+    if one_file and (resume or executor != "threads"):
+        raise InputError("--resume and --executor are for stores: give --out a name that does not end in .semgp.")
+    if not one_file and (kind != "gp" or model == PAPER):
+        raise InputError(
+            f"{out}: only GP maps of many blocks are kept in stores: give --out a name.semgp instead."
+        )
+    clouds = sources(scans, inputs)
+    if not one_file and MapStore(out).numbers():
+        if not resume:
+            raise InputError(
+                f"{out} holds a map already: `semgp update` adds scans to it, --resume goes on with a build that "
+                "was interrupted."
+            )
+        _update_store(out, clouds, executor, workers, address, resume=True)
+        return
+    free = FreeSpace() if free_space or half_life is not None else None
+    forgetting = None if half_life is None else Forgetting(half_life)
+    with progress() as bars:
+        semantic_map: SerialisableMap
         if kind != "gp":
-            semantic_map = MAP_KINDS[kind](sources[0].classes)  # type: ignore[call-arg]
+            semantic_map = MAP_KINDS[kind](clouds[0].classes)  # type: ignore[call-arg]
         elif model == PAPER:
             start = GPModel(max_points=max_points, n_inducing=inducing, seed=seed)
-            paper = _learn_paper(sources, start, iterations, bars) if learn else start
-            semantic_map = GPSemanticMap(sources[0].classes, paper)
+            semantic_map = GPSemanticMap(
+                clouds[0].classes, learn_paper(clouds, start, iterations, bars) if learn else start
+            )
         else:
-            blocks = _block_model(model, resolution, vertical)
-            labelled = [cloud for cloud in sources if cloud.labelled.any()]
-            if learn and model in PRESETS and len(labelled) > 1:
-                blocks = _learn_blocks(labelled, blocks, vertical, seed, bars)
-            free = FreeSpace() if free_space or half_life is not None else None
-            forgetting = None if half_life is None else Forgetting(half_life)
-            semantic_map = GPSemanticMap(sources[0].classes, blocks, free=free, forgetting=forgetting)
-        for cloud in bars.track(sources, description="building the map"):
-            semantic_map.update(cloud)
-        if not len(semantic_map):
-            raise InputError("no scan has a label: nothing to build a map from.")
-        if isinstance(semantic_map, GPSemanticMap):
-            semantic_map.solve()
+            blocks = _blocks(clouds, model, resolution, vertical, learn, seed, bars)
+            if not one_file:
+                MapStore(out).create(Settings(clouds[0].classes, blocks, free, forgetting), "begun")
+            semantic_map = GPSemanticMap(clouds[0].classes, blocks, free=free, forgetting=forgetting)
+        if one_file:
+            _fill(semantic_map, clouds, bars)
+    tell_dropped(clouds)
+    if not one_file:
+        _update_store(out, clouds, executor, workers, address)
+        return
     save_map(semantic_map, out)
-    STDOUT.print(f"{out}: {kind} map of {len(semantic_map):,} elements from {len(sources)} scans")
+    n = len(semantic_map)
+    report(f"{out}: {kind} map of {n:,} elements from {len(clouds)} scans", out=out, kind=kind, elements=n)
 
 
-def learn(
-    scans: list[Path],
+def update(
+    map_place: Path,
     /,
+    scans: list[Path],
     *,
-    out: Path,
-    model: str = "outdoor-lidar",
-    resolution: float | None = None,
-    vertical: Axis = "z",
-    seed: int = 0,
-    quiet: bool = False,
+    inputs: AnyInputs = PLAIN,
+    executor: Workers = "threads",
+    workers: Count = None,
+    address: Address = None,
 ) -> None:
-    """Learn a block model from a sequence of labelled scans, and write it as JSON for "semgp build --model".
+    """Add labelled scans to a map.
 
-    Example: semgp learn sequences/08 --out drive.json
+    Example: semgp update drive sequences/09
 
     Parameters
     ----------
+    map_place
+        A map that "semgp build" wrote: a store, which gets new versions, or a file, which is replaced.
     scans
-        Point files or data-set folders: two scans of one place at least, in the order in which they were taken.
-        Their labels may be wrong: they judge each other.
-    out
-        The model file to write.
-    model
-        Where to begin: general, indoor-rgbd, indoor-labels, outdoor-lidar, or a model file.
-    resolution
-        Edge in metres of the voxels in which labels are added up, instead of the model's.
-    vertical
-        The axis of gravity in the scans' world.
-    seed
-        Seed of every random draw.
-    quiet
-        Show no progress.
+        As for "semgp build", of the map's classes and in its frame.
+    executor
+        Who does the work of a store: the threads of this process, or a Ray cluster.
+    workers
+        How many at a time; one for each core by default.
+    address
+        Address of a Ray cluster, "auto" for the one this machine belongs to; left out, one is started here.
     """
-    sources = _sources(scans)
-    with progress(quiet) as bars:
-        learned = _learn_blocks(sources, _block_model(model, resolution, vertical), vertical, seed, bars)
-    with atomic_write(out) as temporary:
-        temporary.write_text(json.dumps(learned.to_json(), indent=2) + "\n")
-    STDOUT.print(f"{out}: a model from {len(sources)} scans; use it with semgp build --model {out}")
+    clouds = sources(scans, inputs)
+    semantic_map = load_map(map_place)
+    if isinstance(semantic_map, StoredMap):
+        _update_store(map_place, clouds, executor, workers, address)
+        return
+    if not isinstance(semantic_map, SerialisableMap):
+        raise InputError(f"{map_place}: maps of the kind {semantic_map.kind} cannot be written.")
+    if executor != "threads":
+        raise InputError("--executor is for stores, and this map is one file.")
+    with progress() as bars:
+        _fill(semantic_map, clouds, bars)
+    tell_dropped(clouds)
+    save_map(semantic_map, map_place)
+    n = len(semantic_map)
+    report(f"{map_place}: {n:,} elements with {len(clouds)} scans more", out=map_place, elements=n)
 
 
-def _sources(scans: Sequence[Path]) -> list[LabelledCloud]:
-    if not scans:
-        raise InputError("give at least one scan: a point file or a data-set folder.")
-    return [cloud for path in scans for cloud in open_scans(path)]
-
-
-def _block_model(name: str, resolution: float | None, vertical: Axis) -> BlockModel:
-    """Return a preset turned to the world's vertical, or the model in a file as it is."""
-    if name in PRESETS:
-        model = with_vertical(PRESETS[name], "xyz".index(vertical))
-    elif name.endswith(".json"):
-        path = Path(name)
-        try:
-            model = BlockModel.from_json(json.loads(path.read_text()))
-        except OSError as error:
-            raise FileFormatError(path, f"cannot be read: {error.strerror or error}.") from error
-        except (ValueError, InputError) as error:
-            raise FileFormatError(path, f"is no model: {error}") from error
-    else:
-        raise InputError(f"--model must be one of {', '.join(PRESETS)}, {PAPER}, or a .json file, not {name!r}.")
-    return model if resolution is None else replace(model, resolution=resolution)
-
-
-def _learn_blocks(
-    sources: Sequence[LabelledCloud], model: BlockModel, vertical: Axis, seed: int, bars: Progress
+def _blocks(
+    clouds: Scans, model: str, resolution: float | None, vertical: Axis, learn: bool, seed: int, bars: Progress
 ) -> BlockModel:
-    bar = bars.add_task("learning the model", total=None)
+    """The model of blocks, learned where it is to be."""
+    blocks = block_model(model, resolution, vertical)
+    if not learn or model not in PRESETS:
+        return blocks
+    labelled = [cloud for cloud in at_most(clouds, *SAMPLE) if cloud.labelled.any()]
+    return learn_blocks(labelled, blocks, vertical, seed, bars) if len(labelled) > 1 else blocks
 
-    def show(n: int, loss: float) -> None:
-        bars.update(bar, description=f"learning the model: {n} evaluations, log-loss {loss:.4f}")
 
-    return learn_from_scans(sources, model, vertical="xyz".index(vertical), seed=seed, progress=show)[0]
+def _fill(semantic_map: SerialisableMap, clouds: Scans, bars: Progress) -> None:
+    """Update a map in memory with all clouds."""
+    for cloud in bars.track(clouds, description="building the map"):
+        semantic_map.update(cloud)
+    if not len(semantic_map):
+        raise InputError("no scan has a label: nothing to build a map from.")
+    if isinstance(semantic_map, GPSemanticMap):
+        semantic_map.solve()
 
 
-def _learn_paper(sources: Sequence[LabelledCloud], model: GPModel, iterations: int, bars: Progress) -> GPModel:
-    bar = bars.add_task("learning hyperparameters", total=None)
-    first = next((cloud for cloud in sources if cloud.labelled.any()), sources[0])
+def _update_store(
+    place: Path, clouds: Scans, executor: str, workers: int | None, address: str | None, *, resume: bool = False
+) -> None:
+    """Add clouds to a store, a version every few of them, and say what came of it."""
+    store = MapStore(place)
+    done = store.manifest().clouds if resume else 0
+    left = clouds[done:]
 
-    def show(n: int, nlml: float) -> None:
-        bars.update(bar, description=f"learning hyperparameters: {n} evaluations, NLML {nlml:.1f}")
+    def kept() -> str:
+        manifest = store.manifest()
+        return f"{place} holds version {manifest.number} with {manifest.clouds} scans; --resume goes on from there"
 
-    return learn_model(first, model, max_iterations=iterations, progress=show)[0]
+    with keeping(kept), progress() as bars:
+        bar = bars.add_task("building the map", total=len(clouds), completed=done)
+        if store.manifest().settings.forgetting is None:
+            with open_executor(executor, workers, address) as work:
+                build_stored(store, left, work, steps=lambda n: bars.update(bar, advance=n))
+        else:
+            _update_in_order(store, left, bars)
+    manifest = store.manifest()
+    if not manifest.sites:
+        raise InputError(f"no scan has a label: {place} holds an empty map.")
+    report(
+        f"{place}: version {manifest.number}, {manifest.sites:,} sites from {manifest.clouds} scans in "
+        f"{len(manifest.tiles)} tiles, {manifest.n_bytes / 1e6:.1f} MB",
+        out=place, version=manifest.number, sites=manifest.sites, scans=manifest.clouds, bytes=manifest.n_bytes,
+    )  # fmt: skip
+
+
+def _update_in_order(store: MapStore, clouds: Scans, bars: Progress) -> None:
+    """Add clouds one after the other, to a map that forgets."""
+    with StoredMap(store) as stored:
+        for i, cloud in enumerate(bars.track(clouds, description="building the map"), 1):
+            stored.update(cloud)
+            if i % BATCH == 0:
+                stored.commit()

@@ -3,42 +3,120 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from semgp.errors import InputError
-from semgp.writers import atomic_write
 
 STDOUT = Console(width=None if sys.stdout.isatty() else 124)
 STDERR = Console(stderr=True)
 
 
+@dataclass
+class Manners:
+    """What the user asked of every command alike: see `semgp.cli.app`."""
+
+    quiet: bool = False
+    verbose: bool = False
+    json: bool = False
+
+
+MANNERS = Manners()
+
+
+def behave(*, quiet: bool, verbose: bool, json: bool) -> None:
+    """Take the user's wishes for the command that runs next."""
+    MANNERS.quiet, MANNERS.verbose, MANNERS.json = quiet, verbose, json
+    STDOUT.quiet = quiet or json
+
+
+def report(words: str | Table, **facts: Any) -> None:
+    """Say what came out, once a command: words for people or, with --json, the facts as one JSON object.
+
+    Parameters
+    ----------
+    words : str or Table
+        One line, or a table of scores.
+    **facts
+        The same for programs: numbers, texts, paths, arrays, and lists and mappings of them.
+    """
+    if MANNERS.json:
+        sys.stdout.write(json.dumps(_plain(facts), indent=2) + "\n")
+    elif isinstance(words, str):
+        STDOUT.print(words, markup=False, highlight=False, soft_wrap=True)
+    else:
+        STDOUT.print(words)
+
+
 @contextmanager
 def progress(quiet: bool = False) -> Iterator[Progress]:
-    """Show progress on standard error while the block runs; nothing where it is no terminal or `quiet`."""
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), TimeElapsedColumn())
-    with Progress(*columns, console=STDERR, transient=True, disable=quiet or not STDERR.is_terminal) as bars:
+    """Show progress on standard error while the block runs; nothing where it is no terminal or --quiet.
+
+    With --verbose, the time that each task took is written afterwards.
+    """
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), _Pace(), TimeElapsedColumn())
+    silent = quiet or MANNERS.quiet or not STDERR.is_terminal
+    with Progress(*columns, console=STDERR, transient=True, disable=silent) as bars:
         yield bars
+    if MANNERS.verbose:
+        for task in bars.tasks:
+            STDERR.print(f"{task.description}: {task.elapsed or 0:.2f} s", markup=False, highlight=False)
 
 
-def write_json(path: Path | None, value: Any) -> None:
-    """Write a value as JSON: to a file, whole or not at all, or to standard output where the path is "-"."""
-    if path is None:
-        return
-    text = json.dumps(value, indent=2, allow_nan=False) + "\n"
-    if str(path) == "-":
-        STDOUT.file.write(text)
-        return
-    with atomic_write(path) as temporary:
-        temporary.write_text(text)
+class _Pace(ProgressColumn):
+    """How many are done, how fast, and the time that is left; nothing where the total is not known."""
+
+    def render(self, task: Task) -> Text:
+        if task.total is None:
+            return Text()
+        words = f"{task.completed:,.0f}/{task.total:,.0f}"
+        speed = task.finished_speed or task.speed
+        if speed:
+            words += (
+                f"  {speed:,.0f}/s"
+                if speed >= 10
+                else f"  {speed:.1f}/s"
+                if speed >= 1
+                else f"  {1 / speed:.1f} s each"
+            )
+        if task.time_remaining:
+            minutes, seconds = divmod(math.ceil(task.time_remaining), 60)
+            words += f"  {minutes}:{seconds:02d} left"
+        return Text(words, style="progress.remaining")
+
+
+@contextmanager
+def keeping(say: Callable[[], str]) -> Iterator[None]:
+    """Tell, after Ctrl-C in the block, what it leaves behind: `say` is asked for it then."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(say()) from stop
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it: paths as texts, arrays as lists, what is not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
 
 
 HEADINGS = {

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 
-def demo(*, out: Path = Path("semgp-demo"), seed: int = 0, quiet: bool = False) -> None:
+def demo(*, out: Path = Path("semgp-demo"), seed: int = 0) -> None:
     """Map a synthetic room from sparse, partly wrong labels: a table, a picture and a saved map, in a minute.
 
     Example: semgp demo --out my-demo
@@ -17,17 +17,16 @@ def demo(*, out: Path = Path("semgp-demo"), seed: int = 0, quiet: bool = False) 
         The folder to write to.
     seed
         Seed of the room, its sensor and the training subset.
-    quiet
-        Show no progress.
     """
-    from semgp.cli.console import STDOUT, progress, require_folder, score_table
+    from semgp.cli.console import STDOUT, keeping, progress, report, require_folder, score_table
     from semgp.evaluation.demo import METHODS, demo_pictures, demo_task, warm_up
     from semgp.evaluation.task import run
     from semgp.maps.files import save_map
+    from semgp.maps.gp import GPSemanticMap
     from semgp.picture.image import save_png
 
     require_folder(out)
-    with progress(quiet) as bars:
+    with keeping(lambda: _kept(out)), progress() as bars:
         bar = bars.add_task("scanning a synthetic room", total=len(METHODS) + 2)
         scan, task = demo_task(seed)
         results = []
@@ -40,12 +39,17 @@ def demo(*, out: Path = Path("semgp-demo"), seed: int = 0, quiet: bool = False) 
         bars.update(bar, advance=1, description="drawing")
         gp = results[0]
         assert gp.prediction is not None
-        assert gp.semantic_map is not None
+        assert isinstance(gp.semantic_map, GPSemanticMap)
         for name, picture in demo_pictures(scan, gp.prediction).items():
             save_png(out / f"{name}.png", picture)
         save_map(gp.semantic_map, out / "room.semgp")
     columns = ("method", "auc", "accuracy", "miou", "nll", "ece", "fit_seconds", "query_seconds")
-    STDOUT.print(
-        score_table("A synthetic room, sparse and partly wrong labels", [r.row() for r in results], columns)
-    )
+    rows = [result.row() for result in results]
+    report(score_table("A synthetic room, sparse and partly wrong labels", rows, columns), out=out, rows=rows)
     STDOUT.print(f"{out}/overview.png shows it; {out}/room.semgp is the map. Next: semgp info {out}/room.semgp")
+
+
+def _kept(out: Path) -> str:
+    """What Ctrl-C leaves."""
+    made = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
+    return f"{out} holds {', '.join(made) or 'nothing yet'}."

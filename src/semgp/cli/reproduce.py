@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import App
-
-from semgp.cli.options import JsonOut
 
 if TYPE_CHECKING:
     from semgp.evaluation.experiment import Experiment
@@ -34,10 +33,8 @@ def nyu(
     soft: bool = False,
     classes: Literal[13, 40] = 13,
     seed: int = 0,
-    json: JsonOut = None,
     report: Path | None = None,
     room: Path | None = None,
-    quiet: bool = False,
 ) -> None:
     """Run the paper's experiments on NYU Depth V2.
 
@@ -60,14 +57,10 @@ def nyu(
         NYU13 or NYU40 classes.
     seed
         Seed of the training subset and of all that the methods draw.
-    json
-        Write the rows to this file, or to standard output with "-".
     report
         Write a report into this folder: tables with the paper's numbers beside ours, maps, curves, settings.
     room
         Folder of a labelled Stanford 2D-3D-S room (.pcd pieces), whose OctoMap the report shows, too.
-    quiet
-        Show no progress and no table.
     """
     from semgp.evaluation.figures import camera_view
     from semgp.evaluation.nyu import nyu_task
@@ -76,11 +69,12 @@ def nyu(
 
     source = open_nyu(data)
     chosen = _choose(methods, NYUBlocks(source, classes, seed).methods())
-    tasks = (nyu_task(source.read(f, classes), experiment, soft, seed) for f in _numbers("frames", frames, int))
+    numbers = _numbers("frames", frames, int)
+    tasks = (nyu_task(source.read(f, classes), experiment, soft, seed) for f in numbers)
     view = (lambda task: camera_view(task.truth)) if report else None
     settings = {"experiment": experiment, "soft": soft, "classes": classes, "seed": seed}
     title = f"NYU Depth V2, {experiment} labels{', soft' if soft else ''}, {classes} classes"
-    _finish(_run(tasks, chosen, quiet, view=view), title, settings, json, report, room, quiet)
+    _finish(_run(tasks, len(numbers), chosen, view=view), title, settings, report, room)
 
 
 @reproduce.command
@@ -92,9 +86,7 @@ def semantickitti(
     methods: str = "csm,bki,knn",
     scans: int = 10,
     seed: int = 0,
-    json: JsonOut = None,
     report: Path | None = None,
-    quiet: bool = False,
 ) -> None:
     """Map a network's labels of SemanticKITTI scans, and score at every truly labelled point.
 
@@ -112,25 +104,22 @@ def semantickitti(
         So many of the first scans.
     seed
         Seed of all that is drawn.
-    json
-        Write the rows to this file, or to standard output with "-".
     report
         Write a report into this folder: tables with published numbers beside ours, maps, curves, settings.
-    quiet
-        Show no progress and no table.
     """
     from semgp.evaluation.figures import street_view
     from semgp.evaluation.semantic_kitti import METHODS, kitti_sequence, kitti_task
 
     chosen = _choose(methods, METHODS)
     sequence = kitti_sequence(data)
-    tasks = (kitti_task(sequence, share, seed, scans) for share in _numbers("keep", keep, float))
+    shares = _numbers("keep", keep, float)
+    tasks = (kitti_task(sequence, share, seed, scans) for share in shares)
     view = (lambda task: street_view(task.truth)) if report else None
-    ran = _run(tasks, chosen, quiet, view=view, disc_scale=1.8)
-    _finish(ran, "SemanticKITTI", {"scans": scans, "seed": seed}, json, report, None, quiet)
+    ran = _run(tasks, len(shares), chosen, view=view, disc_scale=1.8)
+    _finish(ran, "SemanticKITTI", {"scans": scans, "seed": seed}, report, None)
 
 
-def _run(tasks: Iterable[Any], methods: Mapping[str, Method], quiet: bool, **drawing: Any) -> Experiment:
+def _run(tasks: Iterable[Any], n_tasks: int, methods: Mapping[str, Method], **drawing: Any) -> Experiment:
     """Run an experiment with progress."""
     from semgp.cli.console import progress
     from semgp.evaluation.curves import require_matplotlib
@@ -138,41 +127,34 @@ def _run(tasks: Iterable[Any], methods: Mapping[str, Method], quiet: bool, **dra
 
     if drawing.get("view") is not None:
         require_matplotlib()
-    with progress(quiet) as bars:
-        bar = bars.add_task("", total=None)
+    with progress() as bars:
+        bar, done = bars.add_task("", total=n_tasks * len(methods)), count()
 
         def step(task: str, method: str) -> None:
-            bars.update(bar, description=f"{task}: {method}")
+            bars.update(bar, description=f"{task}: {method}", completed=next(done))
 
         return run_experiment(tasks, methods, step, **drawing)
 
 
 def _finish(
-    experiment: Experiment,
-    title: str,
-    settings: dict[str, Any],
-    json: Path | None,
-    report: Path | None,
-    room: Path | None,
-    quiet: bool,
+    experiment: Experiment, title: str, settings: dict[str, Any], folder: Path | None, room: Path | None
 ) -> None:
-    """Print the tables, with each method's mean over the frames, and write what was asked for."""
-    from semgp.cli.console import STDOUT, score_table, write_json
+    """Show the tables, with each method's mean over the frames, and write the report that was asked for."""
+    from semgp.cli.console import STDOUT, report, score_table
     from semgp.evaluation import experiment as experiments
 
     rows = [result.row() for result in experiment.results]
-    if not (quiet or str(json) == "-"):
-        for name in dict.fromkeys(row["experiment"] for row in rows):
-            of_name = [row for row in rows if row["experiment"] == name]
-            means = [_mean(method, of_name) for method in dict.fromkeys(row["method"] for row in of_name)]
-            STDOUT.print(
-                score_table(f"{title}: {name}", of_name + (means if len(of_name) > len(means) else []), COLUMNS)
-            )
-    write_json(json, {**settings, "rows": rows})
-    if report is not None:
+    for name in dict.fromkeys(row["experiment"] for row in rows):
+        of_name = [row for row in rows if row["experiment"] == name]
+        means = [_mean(method, of_name) for method in dict.fromkeys(row["method"] for row in of_name)]
+        shown = of_name + (means if len(of_name) > len(means) else [])
+        STDOUT.print(score_table(f"{title}: {name}", shown, COLUMNS))
+    page, words = None, f"{len(rows)} rows; --json gives them to programs, --report FOLDER writes a page"
+    if folder is not None:
         command = " ".join(["semgp", *sys.argv[1:]])
-        page = experiments.report(report, experiment, title, settings, command, room)
-        STDOUT.print(f"{page}: open it in a browser")
+        page = experiments.report(folder, experiment, title, settings, command, room)
+        words = f"{page}: open it in a browser"
+    report(words, **settings, rows=rows, report=page)
 
 
 def _mean(method: str, rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -1,48 +1,21 @@
-"""`semgp fuse`, `surface` and `slice`: maps joined, their surfaces as meshes, and slices for planners."""
+"""`semgp fuse`, `surface` and `slice`: maps joined, surfaces as meshes, slices to look at or to plan on."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
 
-from semgp.checks import rigid_transform
-from semgp.cli.console import STDOUT, progress
+from semgp.cli.console import progress, report
 from semgp.errors import FileFormatError, InputError
-from semgp.maps.files import load_map, save_map
-from semgp.maps.fusion import fuse as fuse_maps
-from semgp.maps.gp import GPSemanticMap
-from semgp.maps.protocol import SpatialMap
-from semgp.octomap import SemanticOctoMap
+
+if TYPE_CHECKING:
+    from semgp.maps.protocol import SpatialMap
 
 Pair = Annotated[tuple[float, float], Parameter(negative="")]
-
-
-def fuse(map_file: Path, other: Path, /, *, out: Path, transform: Path | None = None) -> None:
-    """Join two maps that were built apart into one of all that both have seen.
-
-    Example: semgp fuse robot-1.semgp robot-2.semgp --out both.semgp
-
-    Parameters
-    ----------
-    map_file
-        A GP map that "semgp build" wrote; its frame is that of the result.
-    other
-        Another one of the same classes and model.
-    out
-        The map file to write.
-    transform
-        A text file with the 4 x 4 matrix that takes the other map's frame to the first one's; left out, they share
-        a frame.
-    """
-    a, b = (_gp_map(path) for path in (map_file, other))
-    T_a_b = None if transform is None else _matrix(transform)
-    joined = fuse_maps(a, b, T_a_b)
-    save_map(joined, out)
-    STDOUT.print(f"{out}: {len(joined):,} sites from {len(a):,} and {len(b):,}")
 
 
 def surface(
@@ -53,43 +26,42 @@ def surface(
     resolution: float,
     of: str = "occupied",
     level: float = 0.5,
-    quiet: bool = False,
 ) -> None:
     """Write the surface of what is there as a mesh, with classes, probabilities and variance at its vertices.
 
     Example: semgp surface room.semgp --resolution 0.05 --out room-mesh.ply
+
+    Example: semgp surface drive.semgp --of car --resolution 0.1 --out cars.glb
 
     Parameters
     ----------
     map_file
         A map with free space: "semgp build --free-space", or an OctoMap.
     out
-        The mesh to write, a .ply file.
+        The mesh to write: .ply, or .glb for browsers and Blender.
     resolution
         Edge in metres of the cells of the mesh; any will do, the map is continuous.
     of
         "occupied", or the name of a class.
     level
         The probability at which the surface lies.
-    quiet
-        Show no progress.
     """
     from semgp.surfaces import surface as extract
-    from semgp.surfaces import write_mesh
+    from semgp.surfaces.write import require_mesh_name, write_mesh
 
-    if out.suffix != ".ply":
-        raise InputError(f"{out}: meshes are written as .ply.")
-    with progress(quiet) as bars:
+    require_mesh_name(out)
+    with progress() as bars:
         bar = bars.add_task("extracting the surface", total=None)
         mesh = extract(
-            _spatial_map(map_file),
+            spatial_map(map_file),
             of,
             resolution=resolution,
             level=level,
             progress=lambda n, total: bars.update(bar, completed=n, total=total),
         )
     write_mesh(out, mesh)
-    STDOUT.print(f"{out}: {len(mesh.faces):,} faces, {mesh.area:,.1f} square metres")
+    words = f"{out}: {len(mesh.faces):,} faces, {mesh.area:,.1f} square metres"
+    report(words, out=out, vertices=len(mesh.vertices), faces=len(mesh.faces), area=mesh.area)
 
 
 def slice_(
@@ -97,75 +69,125 @@ def slice_(
     /,
     *,
     out: Path,
-    heights: Pair,
+    heights: Pair | None = None,
+    height: float | None = None,
     low: Pair | None = None,
     high: Pair | None = None,
     resolution: float | None = None,
     costs: Path | None = None,
 ) -> None:
-    """Write a horizontal slice as the .pgm and .yaml files of ROS' map_server.
+    """Write a horizontal slice: a picture of classes and entropy, or .pgm and .yaml for ROS' map_server.
+
+    Example: semgp slice floor.semgp --height 1.0 --out floor.png
 
     Example: semgp slice floor.semgp --heights 0.1 1.2 --resolution 0.05 --out floor.yaml
 
     Parameters
     ----------
     map_file
-        A map with free space: "semgp build --free-space", or an OctoMap. Its z axis points up.
+        A map whose z axis points up; for a .yaml, one with free space: "semgp build --free-space", or an OctoMap.
     out
-        The .yaml file to write; the .pgm goes beside it.
+        The file to write: .png, or .yaml with the .pgm beside it.
     heights
-        From and to, metres: what is there between them is an obstacle.
+        For a .yaml: from and to, metres; what is there between them is an obstacle.
+    height
+        For a .png: z in metres.
     low
         Corner of the slice, x and y in metres; left out, that of all that is mapped.
     high
         The corner across from it.
     resolution
-        Edge of a cell in metres; left out, the map's.
+        Edge of a cell in metres; left out, the map's for a .yaml, and what the picture shows for a .png.
     costs
-        A JSON file of costs from 0 to 100 by class name: cells then hold the cost of what they hold.
+        For a .yaml: a JSON file of costs from 0 to 100 by class name; cells then hold the cost of what they hold.
     """
+    if out.suffix.lower() == ".png":
+        if height is None or heights is not None or costs is not None:
+            raise InputError("a .png shows the slice at one --height; --heights and --costs are for .yaml files.")
+        _draw_slice(map_file, out, height, low, high, resolution)
+    else:
+        if heights is None or height is not None:
+            raise InputError(f"{out}: give a .yaml file and --heights FROM TO, or a .png file and --height Z.")
+        _write_grid(map_file, out, heights, low, high, resolution, costs)
+
+
+def _draw_slice(
+    map_file: Path, out: Path, height: float, low: Pair | None, high: Pair | None, resolution: float | None
+) -> None:
+    from semgp.maps.files import load_map
+    from semgp.picture.image import save_png
+    from semgp.planning.section import section
+
+    with progress() as bars:
+        bar = bars.add_task("asking the map", total=None)
+        cut = section(
+            load_map(map_file),
+            height,
+            low,
+            high,
+            resolution=resolution,
+            progress=lambda n, total: bars.update(bar, completed=n, total=total),
+        )
+        save_png(out, cut.picture())
+    rows, columns = cut.label.shape
+    known = float(np.isfinite(cut.entropy).mean())
+    words = f"{out}: {columns} x {rows} cells of {cut.resolution:.3g} m, {known:.0%} of them observed"
+    report(words, out=out, columns=columns, rows=rows, resolution=cut.resolution, observed=known)
+
+
+def _write_grid(
+    map_file: Path,
+    out: Path,
+    heights: Pair,
+    low: Pair | None,
+    high: Pair | None,
+    resolution: float | None,
+    costs: Path | None,
+) -> None:
     from semgp.planning import occupancy_grid
 
-    semantic_map = _spatial_map(map_file)
-    mapped = np.concatenate([semantic_map.occupied_positions, semantic_map.free_positions])[:, :2]
-    if not len(mapped):
-        raise InputError(f"{map_file} holds no free space and nothing occupied: build it from scans with a pose.")
-    grid = occupancy_grid(
-        semantic_map,
-        mapped.min(axis=0) if low is None else low,
-        mapped.max(axis=0) if high is None else high,
-        heights=heights,
-        resolution=semantic_map.resolution if resolution is None else resolution,
-        costs=None if costs is None else _costs(costs),
-    )
-    grid.write(out)
+    with progress() as bars:
+        bars.add_task("asking the map", total=None)
+        semantic_map = spatial_map(map_file)
+        mapped = np.concatenate([semantic_map.occupied_positions, semantic_map.free_positions])[:, :2]
+        if not len(mapped):
+            raise InputError(
+                f"{map_file} holds no free space and nothing occupied: build it from scans with a pose."
+            )
+        grid = occupancy_grid(
+            semantic_map,
+            mapped.min(axis=0) if low is None else low,
+            mapped.max(axis=0) if high is None else high,
+            heights=heights,
+            resolution=semantic_map.resolution if resolution is None else resolution,
+            costs=None if costs is None else _costs(costs),
+        )
+        grid.write(out)
     rows, columns = grid.data.shape
-    STDOUT.print(f"{out}: {columns} x {rows} cells, {np.mean(grid.data >= 0):.0%} of them known")
+    known = float(np.mean(grid.data >= 0))
+    words = f"{out}: {columns} x {rows} cells, {known:.0%} of them known"
+    report(words, out=out, columns=columns, rows=rows, resolution=grid.resolution, known=known)
 
 
-def _gp_map(path: Path) -> GPSemanticMap:
-    semantic_map = load_map(path)
-    if not isinstance(semantic_map, GPSemanticMap):
-        raise InputError(f"{path} holds a {semantic_map.kind} map: only GP maps are joined.")
-    return semantic_map
+def spatial_map(path: Path) -> SpatialMap:
+    """Return the map at a place, which keeps free space.
 
+    Raises
+    ------
+    InputError
+        A map that does not; FileFormatError where the file is none.
+    """
+    from semgp.maps.files import load_map
+    from semgp.maps.gp import GPSemanticMap
+    from semgp.octomap import SemanticOctoMap
+    from semgp.store.map import StoredMap
 
-def _spatial_map(path: Path) -> SpatialMap:
     semantic_map = load_map(path)
     if isinstance(semantic_map, SemanticOctoMap) or (
-        isinstance(semantic_map, GPSemanticMap) and semantic_map.free is not None
+        isinstance(semantic_map, GPSemanticMap | StoredMap) and semantic_map.free is not None
     ):
         return semantic_map
     raise InputError(f"{path} keeps no free space: build it with semgp build --free-space.")
-
-
-def _matrix(path: Path) -> np.ndarray:
-    try:
-        return rigid_transform(str(path), np.loadtxt(path))
-    except OSError as error:
-        raise FileFormatError(path, f"cannot be read: {error.strerror or error}.") from error
-    except ValueError as error:
-        raise FileFormatError(path, f"is no 4 x 4 matrix in text: {error}") from error
 
 
 def _costs(path: Path) -> dict[str, int]:

@@ -21,6 +21,11 @@ FORMAT = "semgp-map"
 VERSION = 1
 
 
+def is_file_name(path: str | Path) -> bool:
+    """Tell whether a name is that of a map file rather than of a store."""
+    return Path(path).suffix == ".semgp"
+
+
 def save_map(semantic_map: SerialisableMap, path: str | Path) -> None:
     """Write a map to a file, whole or not at all.
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgp.blocks.merging import joined, moved, stored_sums
 from semgp.blocks.model import EXPERTS, BlockModel
 from semgp.checks import rigid_transform
+from semgp.classes import Classes
 from semgp.errors import InputError
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.gp import GPSemanticMap
@@ -60,11 +61,7 @@ def fuse(
     T_b = T_a if T_a_b is None else rigid_transform("T_a_b", T_a_b)
     for name, m in (("a", a), ("b", b)):
         _require_blocks(name, m)
-    if a.classes.names != b.classes.names:
-        raise InputError(
-            f"the maps' classes differ: a has {', '.join(a.classes.names)}, b has {', '.join(b.classes.names)}. "
-            "Build both with the same classes."
-        )
+    require_same_classes(a.classes, b.classes)
     model = _model(a, b, model)
     free = _free(a, b, model, free)
     prefixes = ("",) if free is None else ("", "free.")
@@ -86,6 +83,15 @@ def fuse(
     return GPSemanticMap.from_arrays(a.classes, {"blocks": True, **header}, arrays)
 
 
+def require_same_classes(a: Classes, b: Classes) -> None:
+    """Raise InputError where two maps' classes differ."""
+    if a.names != b.names:
+        raise InputError(
+            f"the maps' classes differ: a has {', '.join(a.names)}, b has {', '.join(b.names)}. "
+            "Build both with the same classes."
+        )
+
+
 def _require_blocks(name: str, m: GPSemanticMap) -> None:
     if not isinstance(m, GPSemanticMap) or not isinstance(m.model, BlockModel):
         what = f"of a {type(m.model).__name__}" if isinstance(m, GPSemanticMap) else f"a {type(m).__name__}"
@@ -105,7 +111,7 @@ def _model(a: GPSemanticMap, b: GPSemanticMap, model: BlockModel | None) -> Bloc
     assert isinstance(a.model, BlockModel)
     assert isinstance(b.model, BlockModel)
     if model is None:
-        _require_same("models", a.model, b.model, "model=...")
+        require_same("models", a.model, b.model, "model=...")
         return a.model
     if not isinstance(model, BlockModel):
         raise InputError(f"the fused map's model must be a BlockModel, not {type(model).__name__}.")
@@ -129,12 +135,13 @@ def _free(a: GPSemanticMap, b: GPSemanticMap, model: BlockModel, free: FreeSpace
             raise InputError(
                 "in voxels of another size free space needs other settings: give free=FreeSpace(...), too."
             )
-        _require_same("settings of free space", a.free, b.free, "free=...")
+        require_same("settings of free space", a.free, b.free, "free=...")
         free = a.free
     return free.of_resolution(model.resolution)
 
 
-def _require_same(what: str, a: BlockModel | FreeSpace, b: BlockModel | FreeSpace, argument: str) -> None:
+def require_same(what: str, a: BlockModel | FreeSpace, b: BlockModel | FreeSpace, argument: str) -> None:
+    """Raise InputError where two maps' settings differ; the argument is what could say which are meant."""
     differ = _differences(a, b)
     if differ:
         raise InputError(

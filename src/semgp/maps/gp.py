@@ -179,6 +179,11 @@ class GPSemanticMap:
         return self._occupancy.positions(FREE)
 
     @property
+    def many_blocks(self) -> ManyBlocks | None:
+        """The sites and blocks of a map for real work, None for the paper's."""
+        return self._state if isinstance(self._state, ManyBlocks) else None
+
+    @property
     def _occupancy(self) -> Occupancy:
         occupancy = self._state.occupancy if isinstance(self._state, ManyBlocks) else None
         if occupancy is None:

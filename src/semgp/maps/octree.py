@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from semgp.errors import InputError
-from semgp.maps.protocol import BATCH, SpatialMap, occupancy_of
+from semgp.maps.protocol import BATCH, SpatialMap
 from semgp.octomap import SemanticOctoMap
 from semgp.octomap.bricks import Bricks
 from semgp.octomap.morton import DEPTH, HALF, OUTSIDE, cell_centres, voxel_codes
@@ -19,8 +21,9 @@ def to_octomap(semantic_map: SpatialMap, resolution: float | None = None) -> Sem
     """Return the voxels in which a map has data, each with what the map says at its centre.
 
     Voxels that touch them are taken too where they are free: a map keeps thinned samples of its free space
-    (`FreeSpace.thin`), and knows what is between them. Log-odds are kept within the bounds of OctoMap's sensor model, as OctoMap itself keeps them, so that alike voxels
-    become one. Occupied voxels that the map has observed keep its class probabilities.
+    (`FreeSpace.thin`), and knows what is between them. Log-odds are kept within the bounds of OctoMap's sensor
+    model, as OctoMap itself keeps them, so that alike voxels become one. Occupied voxels that the map has observed
+    keep its class probabilities.
 
     Parameters
     ----------
@@ -49,14 +52,13 @@ def to_octomap(semantic_map: SpatialMap, resolution: float | None = None) -> Sem
     codes = _with_neighbours(own, local, edge)
     if codes[0] == OUTSIDE:
         raise InputError(
-            f"the data spans more than {2 * HALF * edge:g} m, the reach of a tree of {edge:g} m: use a coarser one."
+            f"the data spans more than {2 * HALF * edge:g} m, the reach of a tree of {edge:g} m: "
+            "use a coarser resolution."
         )
     return _filled(empty, semantic_map, codes, np.isin(codes, own, assume_unique=True))
 
 
-def _with_neighbours(
-    own: NDArray[np.int64], local: NDArray[np.float64], edge: float
-) -> NDArray[np.int64]:
+def _with_neighbours(own: NDArray[np.int64], local: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
     """Return the codes, ascending, of the voxels that hold positions and of those that touch them."""
     steps = edge * np.stack(np.meshgrid(*[(-1, 0, 1)] * 3), axis=-1).reshape(-1, 3)
     found = [np.unique(voxel_codes((local + step).astype(np.float32), edge)) for step in steps]
@@ -75,25 +77,39 @@ def _filled(
     """Return the OctoMap of the voxels of which the map knows something, those that are not its own if free."""
     centres = cell_centres(codes, np.full(len(codes), DEPTH), empty.resolution) + empty.origin
     values, known = np.empty(len(codes), dtype=np.float32), np.empty(len(codes), dtype=bool)
+    for part in slices(len(codes), BATCH):
+        occupancy = semantic_map.occupancy(centres[part])
+        values[part], known[part] = _clamped(occupancy.probability, empty.sensor), occupancy.known
+    occupied = empty.sensor.occupied(values)
+    known &= own | ~occupied
+    there = known & occupied
+    leaves = Leaves(codes[known], np.full(np.count_nonzero(known), DEPTH), values[known])
+    labels = _labels(semantic_map, codes[there], centres[there])
+    header, arrays = empty.to_arrays()
+    return SemanticOctoMap.from_arrays(
+        semantic_map.classes, header, arrays | Bricks.from_leaves(leaves).to_arrays() | labels
+    )
+
+
+def _labels(
+    semantic_map: SpatialMap, codes: NDArray[np.int64], centres: NDArray[np.float64]
+) -> dict[str, NDArray[Any]]:
+    """Return the class probabilities of voxels as an OctoMap stores them, see `VoxelLabels.to_arrays`."""
     counts = np.zeros(len(codes), dtype=np.int64)
-    labels, masses = [], []
+    labels, masses = [np.empty(0, dtype=np.int32)], [np.empty(0, dtype=np.float32)]
     for part in slices(len(codes), BATCH):
         prediction = semantic_map.query(centres[part])
-        occupancy = occupancy_of(prediction)
-        values[part] = _clamped(occupancy.probability, empty.sensor)
-        occupied = empty.sensor.occupied(values[part])
-        known[part] = occupancy.known & (own[part] | ~occupied)
-        speaks = known[part] & occupied & prediction.observed
-        share = np.where(speaks[:, None], prediction.probability, 0).astype(np.float32)
+        share = np.where(prediction.observed[:, None], prediction.probability, 0).astype(np.float32)
         counts[part] = np.count_nonzero(share, axis=1)
-        labels.append(np.nonzero(share)[1])
+        labels.append(np.nonzero(share)[1].astype(np.int32))
         masses.append(share[share > 0])
-    header, arrays = empty.to_arrays()
-    leaves = Leaves(codes[known], np.full(np.count_nonzero(known), DEPTH), values[known])
-    arrays |= Bricks.from_leaves(leaves).to_arrays()
-    arrays |= {"voxels": codes[counts > 0], "voxel_classes": counts[counts > 0]}
-    arrays |= {"class": np.concatenate(labels).astype(np.int32), "mass": np.concatenate(masses)}
-    return SemanticOctoMap.from_arrays(semantic_map.classes, header, arrays)
+    some = counts > 0
+    return {
+        "voxels": codes[some],
+        "voxel_classes": counts[some],
+        "class": np.concatenate(labels),
+        "mass": np.concatenate(masses),
+    }
 
 
 def _clamped(probability: NDArray[np.floating], sensor: SensorModel) -> NDArray[np.float32]:

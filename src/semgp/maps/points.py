@@ -41,10 +41,9 @@ def _write_npz(
     classes: Classes,
     colours: NDArray[np.uint8],
     probability: NDArray[np.floating],
-    confidence: NDArray[np.floating],
     **fields: Any,
 ) -> None:
-    confidence = np.minimum(confidence, 1)  # a sum of rounded numbers may be a little more
+    confidence = np.minimum(fields.pop("confidence"), 1)  # a sum of rounded numbers may be a little more
     cloud = LabelledCloud(np.asarray(points), classes, weights=probability, colours=colours, confidence=confidence)
     write_npz(path, cloud, **fields)
 
@@ -80,8 +79,8 @@ def point_writer(path: Path) -> PointWriter:
 def write_prediction(path: Path, points: NDArray[np.float64], prediction: Prediction) -> None:
     """Write a prediction at points (M, 3) as a point file; its suffix tells the format.
 
-    Fields: label, the class colour, class probabilities, confidence, entropy, observed (0 or 1) and, where the map has
-    them, variance (of the most probable class), occupancy and state (1 occupied, 0 free, -1 unknown).
+    Fields: label, the class colour, class probabilities, confidence, entropy, observed (0 or 1) and, where the map
+    has them, variance (of the most probable class), occupancy and state (1 occupied, 0 free, -1 unknown).
 
     Raises
     ------

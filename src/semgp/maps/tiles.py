@@ -117,6 +117,11 @@ def cut(state: ManyBlocks, tiling: Tiling, tiles: I64) -> dict[int, Arrays]:
     return found
 
 
+def every_tile(state: ManyBlocks, tiling: Tiling) -> I64:
+    """Return the keys of the tiles that have sites."""
+    return np.unique(np.concatenate([tiling.keys(field.sites.voxels.keys) for field in state.fields.values()]))
+
+
 def _by_tile(tiling: Tiling, tiles: I64, keys: I64) -> dict[int, I64]:
     """The rows of each tile's keys, in their order."""
     of_key = tiling.keys(keys)

@@ -114,7 +114,7 @@ def legend(
     if missing is not None:
         entries.append((missing, GREY))
     swatch, line, margin = font_size, round(1.6 * font_size), font_size
-    longest = max(_font(font_size).getlength(name) for name, _ in entries)
+    longest = max(font(font_size).getlength(name) for name, _ in entries)
     column = math.ceil(longest + 2.6 * swatch)
     fitting = 1 if width is None else max(1, (width - 2 * margin) // column)
     rows = math.ceil(len(entries) / fitting)
@@ -173,12 +173,19 @@ def colour_bar(
     bar = by_value(np.linspace(low, high, length), low, high, colour_map)
     page.paste(Image.fromarray(np.repeat(bar[None], thick, axis=0)), (margin, top))
     draw = ImageDraw.Draw(page)
-    ink = _ink(background)
+    colour = ink(background)
     for value in _ticks(low, high, max(2, length // (4 * font_size))):
         x = margin + round((value - low) / (high - low) * (length - 1))
-        draw.line((x, top + thick, x, top + thick + font_size // 4), fill=ink, width=max(1, font_size // 12))
+        draw.line((x, top + thick, x, top + thick + font_size // 4), fill=colour, width=max(1, font_size // 12))
         _write(page, (x, top + thick + 1.1 * font_size), f"{value:g}", font_size, background, anchor="mm")
     _write(page, (width / 2, 0.9 * font_size), title, font_size, background, anchor="mm")
+    return np.asarray(page)
+
+
+def heading(text: str, width: int, *, font_size: int = 24, background: Colour = WHITE) -> Picture:
+    """Return a line of text on a ground of so many pixels' width."""
+    page = _page(2 * font_size, width, background)
+    _write(page, (width / 2, 1.1 * font_size), text, font_size, background, anchor="mm")
     return np.asarray(page)
 
 
@@ -195,11 +202,12 @@ def _page(height: int, width: int, background: Colour) -> Image.Image:
     return Image.new("RGB", (width, height), background)
 
 
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Return the font of all that is written, with letters of so many pixels."""
     return ImageFont.load_default(size)
 
 
-def _ink(background: Colour) -> Colour:
+def ink(background: Colour) -> Colour:
     """Return a text colour that reads well: near black on light, near white on dark."""
     red, green, blue = background
     return (34, 34, 38) if 0.299 * red + 0.587 * green + 0.114 * blue > 128 else (236, 236, 236)
@@ -209,4 +217,4 @@ def _write(
     page: Image.Image, at: tuple[float, float], text: str, size: int, background: Colour, anchor: str
 ) -> None:
     """Write a line of text, `at` its middle (anchor "mm") or the middle of its left end ("lm")."""
-    ImageDraw.Draw(page).text(at, text, _ink(background), _font(size), anchor=anchor)
+    ImageDraw.Draw(page).text(at, text, ink(background), font(size), anchor=anchor)

@@ -39,7 +39,18 @@ def save_png(path: str | Path, image: Picture) -> None:
         An array that is no picture, a name that does not end in .png, or a folder that does not exist.
     """
     picture = Image.fromarray(checked_picture(image))
-    if Path(path).suffix.lower() != ".png":
-        raise InputError(f"{path}: the name of a PNG file ends in .png.")
+    require_png(path)
     with atomic_write(path) as temporary:
         picture.save(temporary, format="PNG", compress_level=6)
+
+
+def require_png(path: str | Path) -> None:
+    """Check the name of a picture's file.
+
+    Raises
+    ------
+    InputError
+        A name that does not end in .png.
+    """
+    if Path(path).suffix.lower() != ".png":
+        raise InputError(f"{path}: the name of a PNG file ends in .png.")

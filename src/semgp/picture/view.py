@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,6 +80,16 @@ class View:
         """Focal length in pixels."""
         return self.height / 2 / math.tan(math.radians(self.fov) / 2)
 
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """Position (3,) of the eye in the world."""
+        return self.T_world_camera[:3, 3]
+
+    def zoomed(self, zoom: float) -> View:
+        """Return the view with what is in its middle so many times as large: a narrower field of view."""
+        fov = 2 * math.degrees(math.atan(math.tan(math.radians(self.fov) / 2) / zoom))
+        return replace(self, fov=fov)
+
     def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points (N, 3) of the world in the camera's frame."""
         return (points - self.T_world_camera[:3, 3]) @ self.T_world_camera[:3, :3]
@@ -126,13 +136,36 @@ def view_of(
     up = np.asarray(up, dtype=np.float64) / np.linalg.norm(up)
     middle = np.median(points, axis=0)
     forward = _direction(points, middle, origin, up, math.radians(tilt))
+    return framed(points, forward, up, fov=fov, width=width, height=height)
+
+
+def framed(
+    points: NDArray[np.float64],
+    forward: NDArray[np.float64],
+    up: ArrayLike,
+    *,
+    fov: float = 45.0,
+    width: int = 960,
+    height: int = 720,
+    share: float = _FRAMED,
+) -> View:
+    """Return the view along `forward`, a unit vector (3,), stepped back until points (N, 3) fill its frame.
+
+    `share` is the part of the points that is to lie on the inner side of each of the frame's edges.
+
+    Raises
+    ------
+    InputError
+        A direction of view along `up`, or a frame that is none.
+    """
+    middle = np.median(points, axis=0)
     near = View.look_at(middle - forward, middle, up, fov=fov, width=width, height=height)
     x, y, z = (near.to_camera(points) - (0, 0, 1)).T
     tan_y = 0.97 * math.tan(math.radians(fov) / 2)
     tan_x = tan_y * width / height
     # a point is in the frame once the eye is +-x / tan_x - z behind the middle, and likewise for y
-    left, right = (np.quantile(s * x / tan_x - z, _FRAMED) for s in (-1, 1))
-    above, below = (np.quantile(s * y / tan_y - z, _FRAMED) for s in (-1, 1))
+    left, right = (np.quantile(s * x / tan_x - z, share) for s in (-1, 1))
+    above, below = (np.quantile(s * y / tan_y - z, share) for s in (-1, 1))
     aside = (right - left) / 2 * tan_x * near.T_world_camera[:3, 0]
     lower = (below - above) / 2 * tan_y * near.T_world_camera[:3, 1]
     back = max((left + right) / 2, (above + below) / 2, 1e-3)

@@ -1,4 +1,4 @@
-"""From the named columns of a point file (PLY, PCD) to a labelled cloud."""
+"""From the named columns of a point file to a labelled cloud."""
 
 from __future__ import annotations
 
@@ -19,21 +19,29 @@ Columns = Mapping[str, NDArray[Any]]
 LABEL_NAMES = ("label", "class", "classification")
 """Names under which point files keep hard labels; the first that occurs is taken."""
 
+SHORT_NAMES = {"r": "red", "g": "green", "b": "blue"}
+"""Names that some files cut short."""
+
 MOST_NUMBERED_CLASSES = 1000
 """A file that names no classes may have labels below this; above, its labels are hardly class numbers."""
 
 
 def cloud_from_fields(
-    path: Path, fields: Columns, classes: Classes | None = None, features: Sequence[str] = ()
+    path: Path,
+    fields: Columns,
+    classes: Classes | None = None,
+    features: Sequence[str] = (),
+    field: str | None = None,
+    T_world_sensor: NDArray[np.float64] | None = None,
 ) -> LabelledCloud:
     """Return the cloud that the columns of a point file describe.
 
     Names are compared in lower case and without the prefix "scalar_" that CloudCompare writes.
     Coordinates are `x`, `y`, `z` in metres; points with a NaN coordinate, which is how organised clouds mark
     pixels without a return, are left out. Colours are `red`, `green`, `blue`. Hard labels are one of
-    `LABEL_NAMES`; NaN, -1 and the largest value of an unsigned type are missing labels. Soft labels are
-    `p_<class name>` or `prob_<number>`; where a file has both, the soft ones are taken, and the hard label
-    only tells which points have none.
+    `LABEL_NAMES`, or the field that is named; NaN, -1 and the largest value of an unsigned type are missing
+    labels. Soft labels are `p_<class name>` or `prob_<number>`; where a file has both, the soft ones are taken,
+    and the hard label only tells which points have none.
 
     Parameters
     ----------
@@ -42,24 +50,35 @@ def cloud_from_fields(
     fields : mapping of str to (N,) array
         The columns.
     classes : Classes, optional
-        Classes of the labels. Left out, they are named after the `p_` columns, or numbered.
+        Classes of the labels; where it has raw ids, labels that are none of them are missing. Left out, they are
+        named after the `p_` columns, or numbered.
     features : sequence of str
         Columns that become the cloud's features.
+    field : str, optional
+        The column of the hard labels, where it is none of `LABEL_NAMES`, or where the soft ones are not wanted.
+    T_world_sensor : (4, 4) array, optional
+        Pose of the sensor; the points are in the world frame all the same.
 
     Raises
     ------
     FileFormatError
         Columns that are missing or hold what they cannot mean.
     """
-    columns = {name.lower().removeprefix("scalar_"): column for name, column in fields.items()}
-    _require(path, columns, ("x", "y", "z", *features))
+    columns = {_short(name): column for name, column in fields.items()}
+    features, field = tuple(map(_short, features)), field and _short(field)
+    wanted = ("x", "y", "z", *features, *([field] if field else []))
+    if missing := [name for name in wanted if name not in columns]:
+        raise FileFormatError(path, f"has no {', '.join(missing)}; its fields are {', '.join(fields) or 'none'}.")
     points = _stack(columns, ("x", "y", "z"), np.float64)
     kept = ~np.isnan(points).any(axis=1)
-    labels = next((_hard_labels(path, columns[name]) for name in LABEL_NAMES if name in columns), None)
-    soft_names = _soft_names(path, columns)
+    label_names = [field] if field else [name for name in LABEL_NAMES if name in columns]
+    labels = _hard_labels(path, columns[label_names[0]]) if label_names else None
+    soft_names = [] if field else _soft_names(path, columns)
     weights = _stack(columns, soft_names, np.float32) if soft_names else None
     if classes is None:
         classes = _classes_of(path, labels, soft_names)
+    elif labels is not None and weights is None:
+        labels = classes.from_ids(labels)
     if weights is not None and labels is not None:
         weights[labels == MISSING] = 0
         labels = None
@@ -71,7 +90,8 @@ def cloud_from_fields(
             weights=None if weights is None else weights[kept],
             colours=_colours(path, columns, kept),
             features=_stack(columns, features, np.float32)[kept] if features else None,
-            feature_names=tuple(features),
+            feature_names=features,
+            T_world_sensor=T_world_sensor,
         )
     except InputError as error:
         raise FileFormatError(path, str(error)) from error
@@ -93,9 +113,39 @@ def numbered_classes(path: Path, labels: NDArray[np.integer] | None) -> Classes:
     return Classes.numbered(highest + 1)
 
 
-def _require(path: Path, columns: Columns, wanted: Sequence[str]) -> None:
-    if missing := [name for name in wanted if name not in columns]:
-        raise FileFormatError(path, f"has no {', '.join(missing)}; its fields are {', '.join(columns) or 'none'}.")
+def listed_classes(path: Path, lines: Sequence[str]) -> Classes | None:
+    """Return the classes that a file lists in the words of semgp's writers; None for no lines.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for error messages.
+    lines : sequence of str
+        Lines `semgp class <label> <red> <green> <blue> <name>`.
+
+    Raises
+    ------
+    FileFormatError
+        Lines that make no sense, or do not count up from 0.
+    """
+    if not lines:
+        return None
+    rows = [line.split(maxsplit=6)[2:] for line in lines]
+    try:
+        labels = [int(label) for label, *_ in rows]
+        colours = tuple((int(red), int(green), int(blue)) for _, red, green, blue, _ in rows)
+        classes = Classes(tuple(name for *_, name in rows), colours)
+    except (ValueError, InputError) as error:
+        raise FileFormatError(path, f"has class comments that make no sense: {error}.") from error
+    if labels != list(range(len(labels))):
+        raise FileFormatError(path, "has class comments that do not count up from 0.")
+    return classes
+
+
+def _short(name: str) -> str:
+    """Return a column's name as it is compared."""
+    name = name.lower().removeprefix("scalar_")
+    return SHORT_NAMES.get(name, name)
 
 
 def _stack(columns: Columns, names: Sequence[str], dtype: type[np.generic]) -> NDArray[Any]:
@@ -139,6 +189,6 @@ def _colours(path: Path, columns: Columns, kept: NDArray[np.bool_]) -> NDArray[n
     if not all(name in columns for name in names):
         return None
     rgb = np.stack([columns[name] for name in names], axis=1)[kept]
-    if rgb.dtype.kind not in "iu" or (rgb.size and (rgb.min() < 0 or rgb.max() > 255)):
+    if not ((rgb >= 0) & (rgb <= 255) & (rgb == np.round(rgb))).all():
         raise FileFormatError(path, "has colours that are not whole numbers from 0 to 255.")
     return rgb.astype(np.uint8)

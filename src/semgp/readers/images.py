@@ -15,41 +15,55 @@ LARGEST_IMAGE = 50_000_000
 """An image whose header declares more pixels is refused before it is decoded."""
 
 NO_RETURN = (0, 65535)
-"""Values of a depth image in millimetres that mean that the sensor measured nothing."""
+"""Values of a depth image that mean that the sensor measured nothing."""
+
+DEPTH, LABEL, RGB = ("I;16", "I;16B", "I"), ("L", "I;16", "I;16B", "I"), ("RGB",)
+"""Pillow's modes of what is read: 16 bits a pixel, 8 or 16 bits, three channels."""
 
 
-def read_depth_mm(path: Path) -> NDArray[np.float64]:
-    """Return a 16-bit depth image in millimetres as metres, shape (H, W); NaN where it says `NO_RETURN`.
+def read_depth(path: Path, units_per_metre: float = 1000.0) -> NDArray[np.float64]:
+    """Return a 16-bit depth image in metres, shape (H, W); NaN where it says `NO_RETURN`.
 
     Raises
     ------
     FileFormatError
         A file that is missing, damaged, truncated or no 16-bit image.
     """
-    millimetres = _decoded(path, "16-bit depth image", ("I;16", "I;16B", "I"))
-    return np.where(np.isin(millimetres, NO_RETURN), np.nan, millimetres / 1000)
+    depth = _decoded(path, "16-bit depth image", DEPTH)
+    return np.where(np.isin(depth, NO_RETURN), np.nan, depth / units_per_metre)
 
 
-def read_label_image(path: Path, shape: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return an 8-bit image of class ids, of the shape (H, W) that is expected.
+def read_label_image(
+    path: Path, shape: tuple[int, int] | None = None, *, wide: bool = False
+) -> NDArray[np.integer[Any]]:
+    """Return a grey image of class ids, of the shape (H, W) that is expected.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    shape : (int, int), optional
+        Rows and columns; left out, any.
+    wide : bool
+        Take images of 16 bits a pixel, too.
 
     Raises
     ------
     FileFormatError
-        A file that is missing, damaged, truncated, of another shape or no 8-bit grey image.
+        A file that is missing, damaged, truncated, of another shape or no grey image.
     """
-    return _decoded(path, "8-bit label image", ("L",), shape)
+    return _decoded(path, "label image", LABEL if wide else LABEL[:1], shape)
 
 
-def read_colour_image(path: Path, shape: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return a colour image, shape (H, W, 3), of the height and width that are expected.
+def read_colour_image(path: Path, shape: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+    """Return a colour image, shape (H, W, 3), of the height and width that are expected; left out, of any.
 
     Raises
     ------
     FileFormatError
         A file that is missing, damaged, truncated, of another shape or no RGB image.
     """
-    return _decoded(path, "RGB image", ("RGB",), shape)
+    return _decoded(path, "RGB image", RGB, shape)
 
 
 def _decoded(path: Path, kind: str, modes: tuple[str, ...], shape: tuple[int, int] | None = None) -> NDArray[Any]:
@@ -61,7 +75,7 @@ def _decoded(path: Path, kind: str, modes: tuple[str, ...], shape: tuple[int, in
             if image.mode not in modes:
                 raise FileFormatError(path, f"is no {kind}, but of mode {image.mode}.")
             if shape is not None and found != shape:
-                raise FileFormatError(path, f"is an image of {found} pixels, not {shape} like the depth.")
+                raise FileFormatError(path, f"is an image of {found} pixels, where {shape} are expected.")
             if image.height * image.width > LARGEST_IMAGE:
                 raise FileFormatError(path, f"declares {found} pixels, more than any sensor has.")
             return np.array(image)

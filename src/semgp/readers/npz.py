@@ -56,7 +56,7 @@ LARGEST_UNPACKED = 1 << 30
 """Bytes up to which any file is unpacked, however small it is."""
 
 DAMAGE = (
-    *(OSError, EOFError, ValueError, KeyError, TypeError, OverflowError, RuntimeError, SyntaxError),
+    *(OSError, EOFError, ValueError, KeyError, TypeError, OverflowError, RuntimeError, SyntaxError, MemoryError),
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError),
 )
 """What zipfile and numpy raise on damaged or hostile files."""
@@ -106,7 +106,7 @@ def read_arrays(path: Path, names: Collection[str] | None = None) -> dict[str, N
             stored = [member.removesuffix(".npy") for member in archive.namelist()]
             wanted = stored if names is None else [name for name in names if name in stored]
             _refuse_bombs(path, archive)
-            return {name: read_npy(archive.read(f"{name}.npy")) for name in wanted}
+            return {name: read_npy(read_member(archive, archive.getinfo(f"{name}.npy"))) for name in wanted}
     except FileNotFoundError as error:
         raise FileFormatError(path, "no such file.") from error
     except DAMAGE as error:
@@ -118,6 +118,23 @@ def _refuse_bombs(path: Path, archive: zipfile.ZipFile) -> None:
     unpacked = sum(member.file_size for member in archive.infolist())
     if unpacked > LARGEST_UNPACKED and unpacked > 1000 * path.stat().st_size:
         raise FileFormatError(path, f"would unpack to {unpacked:,} bytes: refused as a decompression bomb.")
+
+
+def read_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+    """Return what a member of an archive holds, never unpacking more than its entry says.
+
+    Raises
+    ------
+    ValueError
+        Bytes of another number, or packed in a way that cannot be bounded.
+    """
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError(f"{member.filename} is neither stored nor deflated.")
+    with archive.open(member) as file:
+        raw = file.read(member.file_size)
+        if len(raw) != member.file_size or file.read(1):
+            raise ValueError(f"{member.filename} has not the {member.file_size:,} bytes that its entry says.")
+    return raw
 
 
 def read_npy(raw: bytes) -> NDArray[Any]:

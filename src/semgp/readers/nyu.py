@@ -16,7 +16,8 @@ from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.conventions import NYU13, NYU40, labels_from_nyu
 from semgp.errors import FileFormatError, InputError
-from semgp.readers.images import read_colour_image, read_depth_mm, read_label_image
+from semgp.readers.images import read_colour_image, read_depth, read_label_image
+from semgp.readers.label_folder import LabelFolder
 from semgp.readers.nyu_network import network_probability_image
 from semgp.readers.protocol import Scans
 
@@ -143,7 +144,7 @@ class NYUFolder:
         names = nyu_classes(classes)
         require_frame(frame, self.frames)
         stem = f"{frame:04d}"
-        depth = read_depth_mm(self.path / f"{stem}_depth_mm.png")
+        depth = read_depth(self.path / f"{stem}_depth_mm.png")
         shape = (depth.shape[0], depth.shape[1])
         labels = _labels(self.path / f"{stem}_label{classes}.png", shape, names)
         colours = read_colour_image(self.path / f"{stem}_rgb.jpg", shape)
@@ -166,8 +167,8 @@ class NYUFolderReader:
         self,
         path: Path,
         *,
-        classes: ClassCount = 13,
-        labels: Literal["labels", "predictions"] = "labels",
+        classes: ClassCount | Classes = 13,
+        labels: str | Path = "labels",
     ) -> Scans:
         """Return the frames of a folder, or the one of a depth image.
 
@@ -175,22 +176,43 @@ class NYUFolderReader:
         ----------
         path : Path
             The folder, or a `NNNN_depth_mm.png` in it.
-        classes : 13 or 40
+        classes : 13, 40, NYU13 or NYU40
             Which class list.
-        labels : "labels" or "predictions"
-            The true labels, or those of the network, which are for 13 classes only.
+        labels : "labels", "predictions", str or Path
+            The true labels, those of the network, which are for 13 classes only, or a folder of labels of the
+            colour images (see `semgp.readers.label_folder`).
         """
         folder = NYUFolder(path if path.is_dir() else path.parent)
         match = DEPTH_NAME.fullmatch(path.name)
-        nyu_classes(classes)
-        if labels not in ("labels", "predictions") or (labels == "predictions" and classes != 13):
-            raise InputError("labels is 'labels', or with 13 classes 'predictions'.")
+        count = class_count(classes)
+        images = None if labels in ("labels", "predictions") else LabelFolder(labels)
+        if labels == "predictions" and count != 13:
+            raise InputError("labels is 'labels', a folder of labels, or with 13 classes 'predictions'.")
 
         def scan(frame: int) -> LabelledCloud:
-            read = folder.read(frame, classes)
+            read = folder.read(frame, count)
+            if images is not None:
+                return images.labelled(read.cloud, f"{frame:04d}_rgb")
             return read.cloud if labels == "labels" else replace(read.cloud, labels=read.network_labels)
 
         return Scans((int(match[1]),) if match else folder.frames, scan)
+
+
+def class_count(classes: ClassCount | Classes) -> ClassCount:
+    """Return 13 or 40 for a class list of NYU Depth V2, or for the number itself.
+
+    Raises
+    ------
+    InputError
+        Another class list.
+    """
+    count = len(classes) if isinstance(classes, Classes) else classes
+    own = nyu_classes(count)
+    if isinstance(classes, Classes) and not classes.nameless and classes.names != own.names:
+        raise InputError(
+            f"NYU Depth V2 has the class lists nyu13 and nyu40, not {', '.join(classes.names[:3])} ..."
+        )
+    return 13 if count == 13 else 40
 
 
 def nyu_classes(count: int) -> Classes:
@@ -202,7 +224,9 @@ def nyu_classes(count: int) -> Classes:
         Another number of classes.
     """
     if count not in (13, 40):
-        raise InputError(f"NYU Depth V2 has a class list of 13 and one of 40 classes, none of {count}.")
+        raise InputError(
+            f"NYU Depth V2 has a class list of 13 and one of 40 classes (nyu13, nyu40), none of {count}."
+        )
     return NYU13 if count == 13 else NYU40
 
 

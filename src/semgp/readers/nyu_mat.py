@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from semgp.camera import NYU_CAMERA, cloud_from_depth
-from semgp.classes import MISSING
+from semgp.classes import MISSING, Classes
 from semgp.conventions import NYU40, NYU40_TO_NYU13, relabel
 from semgp.errors import FileFormatError, InputError, MissingExtraError
 from semgp.readers.images import LARGEST_IMAGE
-from semgp.readers.nyu import ClassCount, NYUFrame, nyu_classes, require_frame
+from semgp.readers.nyu import ClassCount, NYUFrame, class_count, nyu_classes, require_frame
 from semgp.readers.protocol import Scans
 
 ARRAYS = ("images", "depths", "labels")
@@ -119,12 +119,12 @@ class NYUMatReader:
         return path.is_file() and path.suffix.lower() == ".mat"
 
     def scans(
-        self, path: Path, *, classes: ClassCount = 13, nyu40_of_name: Mapping[str, str] = PLAIN_NAMES
+        self, path: Path, *, classes: ClassCount | Classes = 13, nyu40_of_name: Mapping[str, str] = PLAIN_NAMES
     ) -> Scans:
         """Return the frames of the file; see `NYUMat` for the options."""
         source = NYUMat(path, nyu40_of_name)
-        nyu_classes(classes)
-        return Scans(source.frames, lambda frame: source.read(frame, classes).cloud)
+        count = class_count(classes)
+        return Scans(source.frames, lambda frame: source.read(frame, count).cloud)
 
 
 @contextmanager

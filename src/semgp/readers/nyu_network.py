@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from semgp.conventions import ADE20K_32, ADE20K_32_TO_NYU13, NYU13
 from semgp.errors import FileFormatError
+from semgp.readers.grids import enlarge
 from semgp.readers.npz import read_arrays
 
 
@@ -32,20 +33,4 @@ def network_probability_image(path: Path, shape: tuple[int, int]) -> NDArray[np.
         raise FileFormatError(path, "has pixels where all probabilities are zero.")
     members = ADE20K_32_TO_NYU13[:, None] == np.arange(len(NYU13))
     coarse = (p / total) @ members
-    down, across = _linear(shape[0], p.shape[0]), _linear(shape[1], p.shape[1])
-    fine = np.einsum("ri,ijc,sj->rsc", down, coarse, across, optimize=True)
-    return np.asarray(fine, dtype=np.float32)
-
-
-def _linear(n_fine: int, n_coarse: int) -> NDArray[np.float64]:
-    """Return the weights (n_fine, n_coarse) of linear interpolation between coarse samples.
-
-    Coarse sample i lies at fine position i n_fine / n_coarse: the network enlarges its own output so (the
-    other custom, by pixel centres, disagrees with its full-size labels at three times as many pixels).
-    """
-    at = np.minimum(np.arange(n_fine) * n_coarse / n_fine, n_coarse - 1)
-    below = np.minimum(at.astype(int), n_coarse - 2)
-    weights = np.zeros((n_fine, n_coarse))
-    weights[np.arange(n_fine), below] = 1 - (at - below)
-    weights[np.arange(n_fine), below + 1] = at - below
-    return weights
+    return enlarge(coarse, shape, corners=True)  # as the network enlarges its own output

@@ -1,7 +1,9 @@
-"""PCD point files of the Point Cloud Library, version 0.7: ASCII and binary."""
+"""PCD point files of the Point Cloud Library, version 0.7: ASCII, binary and compressed."""
 
 from __future__ import annotations
 
+import os
+import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError
-from semgp.readers.fields import cloud_from_fields
+from semgp.readers.fields import cloud_from_fields, listed_classes
 from semgp.readers.table import binary_table, header_line, row_type, text_lines, text_table, whole_number
 
 KEYS = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
@@ -27,7 +29,13 @@ MOST_IN_FIELD = 4096
 """A field with more elements a point is no field of a cloud with labels."""
 
 
-def read_pcd(path: str | Path, *, classes: Classes | None = None, features: Sequence[str] = ()) -> LabelledCloud:
+def read_pcd(
+    path: str | Path,
+    *,
+    classes: Classes | None = None,
+    features: Sequence[str] = (),
+    field: str | None = None,
+) -> LabelledCloud:
     """Read a PCD file; see `cloud_from_fields` for what its fields mean.
 
     Colours packed into a field `rgb` or `rgba` are understood too. A field of several elements becomes the
@@ -39,19 +47,21 @@ def read_pcd(path: str | Path, *, classes: Classes | None = None, features: Sequ
     path : str or Path
         The file.
     classes : Classes, optional
-        Classes of the labels; PCD names none.
+        Classes of the labels. Left out, those of comments `semgp class <label> <red> <green> <blue> <name>`, as
+        semgp writes them; or named after the soft labels; or numbered.
     features : sequence of str
         Fields that become the cloud's features.
+    field : str, optional
+        The field that holds the labels, where it is none of `fields.LABEL_NAMES`.
 
     Raises
     ------
     FileFormatError
-        A file that is no PCD file, is damaged or truncated, or has no x, y and z. Compressed files
-        (DATA binary_compressed) are not supported yet.
+        A file that is no PCD file, is damaged or truncated, or has no x, y and z.
     """
     path = Path(path)
     with path.open("rb") as file:
-        header = _read_header(path, file)
+        header, class_lines = _read_header(path, file)
         row, count = row_type(path, _fields(path, header)), _n_points(path, header)
         match header["DATA"]:
             case ["ascii"]:
@@ -59,24 +69,52 @@ def read_pcd(path: str | Path, *, classes: Classes | None = None, features: Sequ
             case ["binary"]:
                 columns = binary_table(path, file, row, count)
             case ["binary_compressed"]:
-                raise FileFormatError(path, "is compressed, which is not supported yet: save it as binary.")
+                columns = _compressed_table(path, file, row, count)
             case other:
-                raise FileFormatError(path, f"has DATA {' '.join(other)[:40]}; known are ascii and binary.")
-    return cloud_from_fields(path, _unpacked(columns), classes, features)
+                raise FileFormatError(
+                    path, f"has DATA {' '.join(other)[:40]}; known are ascii, binary and binary_compressed."
+                )
+    classes = classes or listed_classes(path, class_lines)
+    return cloud_from_fields(path, _unpacked(columns), classes, features, field)
 
 
-def _read_header(path: Path, file: BinaryIO) -> dict[str, list[str]]:
-    """Return the words of each header line, up to DATA."""
+def _read_header(path: Path, file: BinaryIO) -> tuple[dict[str, list[str]], list[str]]:
+    """Return the words of each header line, up to DATA, and the comments that list the classes."""
     header: dict[str, list[str]] = {}
+    class_lines: list[str] = []
     while "DATA" not in header:
-        match header_line(path, file).split():
+        match (line := header_line(path, file)).split():
+            case ["#", "semgp", "class", *_]:
+                class_lines.append(line.removeprefix("#").strip())
             case [key, *words] if key in KEYS and key not in header:
                 header[key] = words
             case [key, *_] if not key.startswith("#"):
                 raise FileFormatError(path, f"is no PCD file or damaged: {key[:40]!r} heads a header line.")
     if missing := [key for key in ("FIELDS", "SIZE", "TYPE") if key not in header]:
         raise FileFormatError(path, f"has a PCD header without {', '.join(missing)}.")
-    return header
+    return header, class_lines
+
+
+def _compressed_table(path: Path, file: BinaryIO, row: np.dtype[np.void], count: int) -> dict[str, NDArray[Any]]:
+    """Return the columns of a body that is packed by LZF, one column after the other."""
+    from semgp.readers.lzf import unpacked
+
+    sizes = file.read(8)
+    packed, size = struct.unpack("<II", sizes) if len(sizes) == 8 else (0, -1)
+    left = os.fstat(file.fileno()).st_size - file.tell()
+    if size != count * row.itemsize or packed > left:
+        raise FileFormatError(
+            path,
+            f"is truncated or its header lies: {count} rows of {row.itemsize} bytes are declared, but {packed} "
+            f"bytes of {left} are said to unpack to {size}.",
+        )
+    body = unpacked(path, file.read(packed), size)
+    columns, at = {}, 0
+    for name in row.names or ():
+        end = at + count * row[name].itemsize
+        columns[name] = body[at:end].view(row[name])
+        at = end
+    return columns
 
 
 def _fields(path: Path, header: dict[str, list[str]]) -> list[tuple[str, str]]:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
-from semgp.errors import FileFormatError, InputError
-from semgp.readers.fields import cloud_from_fields
+from semgp.errors import FileFormatError
+from semgp.readers.fields import cloud_from_fields, listed_classes
 from semgp.readers.table import (
     binary_table,
     header_line,
@@ -52,7 +52,13 @@ class _Header:
     class_rows: list[str] = field(default_factory=list)
 
 
-def read_ply(path: str | Path, *, classes: Classes | None = None, features: Sequence[str] = ()) -> LabelledCloud:
+def read_ply(
+    path: str | Path,
+    *,
+    classes: Classes | None = None,
+    features: Sequence[str] = (),
+    field: str | None = None,
+) -> LabelledCloud:
     """Read the vertices of a PLY file; see `cloud_from_fields` for what their properties mean.
 
     Parameters
@@ -64,6 +70,8 @@ def read_ply(path: str | Path, *, classes: Classes | None = None, features: Sequ
         semgp writes them; or named after the soft labels; or numbered.
     features : sequence of str
         Properties that become the cloud's features.
+    field : str, optional
+        The property that holds the labels, where it is none of `fields.LABEL_NAMES`.
 
     Raises
     ------
@@ -74,7 +82,7 @@ def read_ply(path: str | Path, *, classes: Classes | None = None, features: Sequ
     with path.open("rb") as file:
         header = _read_header(path, file)
         fields = _read_vertices(path, file, header)
-    return cloud_from_fields(path, fields, classes or _listed_classes(path, header), features)
+    return cloud_from_fields(path, fields, classes or listed_classes(path, header.class_rows), features, field)
 
 
 def _read_header(path: Path, file: BinaryIO) -> _Header:
@@ -92,7 +100,7 @@ def _read_header(path: Path, file: BinaryIO) -> _Header:
             case ["property", kind, name] if header.elements and kind in TYPES:
                 header.elements[-1].properties.append((name, TYPES[kind]))
             case ["comment", "semgp", "class", *_]:
-                header.class_rows.append(line)
+                header.class_rows.append(line.removeprefix("comment").strip())
             case ["comment" | "obj_info", *_] | []:
                 pass
             case _:
@@ -122,19 +130,3 @@ def _read_vertices(path: Path, file: BinaryIO, header: _Header) -> dict[str, NDA
             return text_table(path, lines, row, element.count)
         skip_binary(path, file, row, element.count)
     raise FileFormatError(path, "has no element called vertex.")
-
-
-def _listed_classes(path: Path, header: _Header) -> Classes | None:
-    """Return the classes of the header's comments `semgp class <label> <red> <green> <blue> <name>`."""
-    if not header.class_rows:
-        return None
-    rows = [line.split(maxsplit=7)[3:] for line in header.class_rows]
-    try:
-        labels = [int(label) for label, *_ in rows]
-        colours = tuple((int(red), int(green), int(blue)) for _, red, green, blue, _ in rows)
-        classes = Classes(tuple(name for *_, name in rows), colours)
-    except (ValueError, InputError) as error:
-        raise FileFormatError(path, f"has class comments that make no sense: {error}.") from error
-    if labels != list(range(len(labels))):
-        raise FileFormatError(path, "has class comments that do not count up from 0.")
-    return classes

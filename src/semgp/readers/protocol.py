@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,3 +94,10 @@ class FileReader:
     def scans(self, path: Path, **options: Any) -> Sequence[LabelledCloud]:
         """Return the file's one scan."""
         return Scans(range(1), lambda _: self.read(path, **options))
+
+
+def options_of(reader: Reader) -> tuple[str, ...]:
+    """Return the names of the options that a reader takes: what its function takes by keyword only."""
+    function = reader.read if isinstance(reader, FileReader) else reader.scans
+    parameters = inspect.signature(function).parameters.values()
+    return tuple(p.name for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY)

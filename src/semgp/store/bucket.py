@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semgp.errors import FileFormatError, InputError, MissingExtraError
-from semgp.store.files import Files, LocalFiles
+from semgp.store.files import Files, LocalFiles, WritersLock
 
 if TYPE_CHECKING:
     from obstore.store import ObjectStore
@@ -97,15 +97,9 @@ class BucketFiles:
         """Do nothing: a put is whole or not there."""
         return 0
 
-    def start_writing(self) -> bool | None:
-        """Return None: other writers cannot be seen."""
-        return None
-
-    def share(self) -> None:
-        """Do nothing."""
-
-    def stop_writing(self) -> None:
-        """Do nothing."""
+    def lock(self) -> WritersLock:
+        """Return a lock of nothing: other writers cannot be seen."""
+        return WritersLock()
 
 
 def open_files(location: str | Path) -> Files:

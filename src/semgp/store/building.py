@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from semgp.blocks.arrays import I64
-from semgp.blocks.cells import cell_origin
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.executors import Executor, Steps
 from semgp.executors.protocol import no_steps
 from semgp.maps.protocol import require_classes
 from semgp.maps.tiles import Arrays, changed_tiles, cut
-from semgp.store.manifest import Manifest, Settings, Tile
+from semgp.store.manifest import Manifest, Tile, voxel
 from semgp.store.merge import added
+from semgp.store.settings import Settings
 from semgp.store.store import MapStore
 
 Part = dict[int, Arrays]
@@ -150,12 +150,13 @@ def _add(
 
 def _origin_of(clouds: Sequence[LabelledCloud], rows: range, settings: Settings) -> tuple[int, int, int] | None:
     """Where a map that begins with these clouds has its origin, as `ManyBlocks.add` would choose it."""
+    state = settings.new_state()
     for i in rows:
-        cloud = clouds[i] if settings.free is not None else clouds[i][clouds[i].labelled]
-        if len(cloud):
-            x, y, z = cell_origin(cloud.points, settings.resolution).tolist()
-            return x, y, z
-    return None
+        require_classes(clouds[i], settings.classes)
+        state.add(clouds[i])
+        if state.origin is not None:
+            break
+    return voxel(state.origin)
 
 
 def _part_of(tile: int, settings: Settings, n_parts: int) -> int:

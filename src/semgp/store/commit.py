@@ -8,7 +8,7 @@ import numpy as np
 
 from semgp.errors import ConflictError
 from semgp.maps.tiles import Arrays
-from semgp.store.manifest import Manifest, Tile
+from semgp.store.manifest import Manifest, Tile, voxel
 from semgp.store.merge import merged
 from semgp.store.store import MapStore
 from semgp.store.working_set import WorkingSet
@@ -44,7 +44,7 @@ def commit(working: WorkingSet, base: Manifest, clouds: int, note: str, merge: b
         mine = replace(
             base,
             clouds=base.clouds + clouds,
-            origin=None if origin is None else (int(origin[0]), int(origin[1]), int(origin[2])),
+            origin=voxel(origin),
             clock=clock,
             tiles=dict(working.tiles),
         )

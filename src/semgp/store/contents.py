@@ -14,7 +14,8 @@ from semgp.maps.forgetting import FAINT
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.occupancy import FREE, OCCUPIED
 from semgp.maps.tiles import Arrays, take_in, tile_positions
-from semgp.store.manifest import Manifest, Settings
+from semgp.store.manifest import Manifest
+from semgp.store.settings import Settings
 from semgp.store.store import MapStore
 
 

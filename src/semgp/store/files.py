@@ -10,8 +10,52 @@ from typing import Protocol
 
 from semgp.errors import FileFormatError, InputError
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
 _PARTIAL = ".partial-"
 _LOCK = "writers.lock"
+
+
+class WritersLock:
+    """A lock that writers share, which the system lets go of when a process dies.
+
+    Parameters
+    ----------
+    path : Path, optional
+        The locked file; left out, there is nothing to lock.
+
+    Attributes
+    ----------
+    alone : bool or None
+        Whether there was no other writer, and can be none until `share`; None where that cannot be known.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.alone: bool | None = None
+        self._file: int | None = None
+        if path is None or fcntl is None:
+            return
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self.alone = True
+        except OSError:
+            fcntl.flock(self._file, fcntl.LOCK_SH)
+            self.alone = False
+
+    def share(self) -> None:
+        """Let other writers in."""
+        if self._file is not None and fcntl is not None:
+            fcntl.flock(self._file, fcntl.LOCK_SH)
+
+    def release(self) -> None:
+        """Count as a writer no longer."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
 
 
 class Files(Protocol):
@@ -52,19 +96,8 @@ class Files(Protocol):
         """Remove what writers that died have left half written, and return how many files that was."""
         ...
 
-    def start_writing(self) -> bool | None:
-        """Count as a writer from now on, and tell whether there is no other one and can be none until `share`.
-
-        None where that cannot be known.
-        """
-        ...
-
-    def share(self) -> None:
-        """Let other writers in."""
-        ...
-
-    def stop_writing(self) -> None:
-        """Count as a writer no longer; what the system does by itself for a process that dies."""
+    def lock(self) -> WritersLock:
+        """Count as a writer, until the lock is released or the process dies."""
         ...
 
 
@@ -79,7 +112,6 @@ class LocalFiles:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._lock: int | None = None
 
     @property
     def location(self) -> str:
@@ -88,12 +120,17 @@ class LocalFiles:
 
     def read(self, name: str) -> bytes:
         """Return what a file holds."""
+        path = self.folder / name
         try:
-            return (self.folder / name).read_bytes()
+            if path.exists() and not path.is_file():
+                raise FileFormatError(path, "cannot be read: it is no file.")
+            return path.read_bytes()
+        except MemoryError as error:
+            raise FileFormatError(path, "cannot be read: it is larger than memory.") from error
         except FileNotFoundError as error:
-            raise FileFormatError(self.folder / name, "no such file.") from error
+            raise FileFormatError(path, "no such file.") from error
         except OSError as error:
-            raise FileFormatError(self.folder / name, f"cannot be read: {error.strerror or error}.") from error
+            raise FileFormatError(path, f"cannot be read: {error.strerror or error}.") from error
 
     def create(self, name: str, data: bytes) -> bool:
         """Create a file by linking a finished one to its name: that fails where the name is taken."""
@@ -144,36 +181,13 @@ class LocalFiles:
             path.unlink(missing_ok=True)
         return len(partial)
 
-    def start_writing(self) -> bool | None:
-        """Take the writers' lock for oneself, or share it."""
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            return None
+    def lock(self) -> WritersLock:
+        """Take the writers' lock."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(self.folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            return WritersLock(self.folder / _LOCK)
         except OSError as error:
             raise InputError(f"cannot write to {self.folder}: {error.strerror or error}.") from error
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            fcntl.flock(self._lock, fcntl.LOCK_SH)
-            return False
-        return True
-
-    def share(self) -> None:
-        """Share the writers' lock."""
-        if self._lock is not None:
-            import fcntl
-
-            fcntl.flock(self._lock, fcntl.LOCK_SH)
-
-    def stop_writing(self) -> None:
-        """Let go of the writers' lock."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
 
 
 def _sync_folder(folder: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,20 +16,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from semgp.blocks.arrays import I64
 from semgp.blocks.cells import CELL
-from semgp.blocks.model import BlockModel
-from semgp.classes import Classes
 from semgp.errors import InputError
-from semgp.maps.blocks import ManyBlocks
-from semgp.maps.forgetting import Forgetting
-from semgp.maps.free_space import FreeSpace
 from semgp.maps.tiles import Tiling
+from semgp.store.settings import Settings
+from semgp.voxels import EXACT
 
 FORMAT = "semgp-store"
 VERSION = 1
 
+_FARTHEST = int(EXACT)
 _DIGEST = re.compile(r"[0-9a-f]{64}")
-_DAMAGE = (InputError, ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError)
+_DAMAGE = (InputError, ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, RecursionError)
 
 
 class Tile(NamedTuple):
@@ -42,76 +42,6 @@ class Tile(NamedTuple):
     def name(self, key: int) -> str:
         """Return the name of the file of the tile with a key."""
         return f"{key:016x}-{self.digest[:32]}.npz"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What never changes in a stored map.
-
-    Parameters
-    ----------
-    classes : Classes
-        The map's classes.
-    model : BlockModel
-        The map's model.
-    free : FreeSpace, optional
-        Where the map keeps free space.
-    forgetting : Forgetting, optional
-        Where the map forgets.
-    tiling : Tiling, optional
-        How cells make tiles.
-
-    Raises
-    ------
-    InputError
-        Settings that do not go together, see `GPSemanticMap`.
-    """
-
-    classes: Classes
-    model: BlockModel
-    free: FreeSpace | None = None
-    forgetting: Forgetting | None = None
-    tiling: Tiling = field(default_factory=Tiling)
-
-    def __post_init__(self) -> None:
-        self.new_state()
-
-    @property
-    def resolution(self) -> float:
-        """Edge of a voxel in metres."""
-        return self.model.resolution
-
-    @property
-    def half_blend(self) -> float:
-        """Voxels from a point to the farthest block that has a say in its answer, of labels or of free space."""
-        model = None if self.free is None else self.free.of_resolution(self.resolution).model
-        return max(m.blend for m in (self.model, model) if m is not None) / 2
-
-    def new_state(self) -> ManyBlocks:
-        """Return an empty map with these settings."""
-        return ManyBlocks(self.classes, self.model, self.free, self.forgetting)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the settings as a dictionary ready for JSON."""
-        return {
-            "classes": {"names": self.classes.names, "colours": self.classes.colours},
-            "model": self.model.to_json(),
-            "free": None if self.free is None else self.free.to_json(),
-            "forgetting": None if self.forgetting is None else self.forgetting.to_json(),
-            "tile_cells": self.tiling.cells,
-        }
-
-    @classmethod
-    def from_json(cls, plain: Mapping[str, Any]) -> Settings:
-        """Make the settings again from what `to_json` gave; errors as in `Manifest.from_bytes`."""
-        free, forgetting, classes = plain["free"], plain["forgetting"], plain["classes"]
-        return cls(
-            Classes(tuple(classes["names"]), tuple(tuple(colour) for colour in classes["colours"])),
-            BlockModel.from_json(plain["model"]),
-            None if free is None else FreeSpace.from_json(free),
-            None if forgetting is None else Forgetting.from_json(forgetting),
-            Tiling(plain["tile_cells"]),
-        )
 
 
 @dataclass(frozen=True)
@@ -192,12 +122,14 @@ class Manifest:
         if hashlib.sha256(line).hexdigest().encode() != digest:
             raise InputError("is damaged: its checksum does not fit.")
         try:
-            plain = json.loads(line)
+            plain = json.loads(line, parse_constant=_refuse)
             if plain["format"] != FORMAT:
                 raise InputError(f"is no manifest of a stored map: its format is {plain['format']!r}.")
-            if plain["version"] > VERSION:
+            if _whole(plain["version"], 1) > VERSION:
                 raise InputError(f"was written by a newer semgp (format {plain['version']}): upgrade semgp.")
             origin, clock = plain["origin"], plain["clock"]
+            if origin is None and plain["tiles"]:
+                raise InputError("is damaged: it has tiles, but no origin.")
             return cls(
                 number=_whole(plain["number"], 1),
                 settings=Settings.from_json(plain),
@@ -205,13 +137,18 @@ class Manifest:
                 note=str(plain["note"]),
                 clouds=_whole(plain["clouds"], 0),
                 origin=None if origin is None else _origin(origin),
-                clock=None if clock is None else float(clock),
+                clock=None if clock is None else _finite(clock),
                 tiles=_tiles(plain["tiles"], Tiling(plain["tile_cells"])),
             )
         except _DAMAGE as error:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"is damaged: {type(error).__name__}: {error}") from error
+
+
+def voxel(origin: I64 | None) -> tuple[int, int, int] | None:
+    """Return a voxel (3,) as whole numbers for a manifest."""
+    return None if origin is None else (int(origin[0]), int(origin[1]), int(origin[2]))
 
 
 def _whole(value: Any, least: int) -> int:
@@ -221,10 +158,20 @@ def _whole(value: Any, least: int) -> int:
 
 
 def _origin(plain: Any) -> tuple[int, int, int]:
-    x, y, z = (int(np.int64(v)) for v in plain)
-    if any(v % CELL for v in (x, y, z)):
+    x, y, z = (_whole(v, -_FARTHEST) for v in plain)
+    if any(v % CELL or v > _FARTHEST for v in (x, y, z)):
         raise InputError("is damaged: its origin is no corner of a cell.")
     return x, y, z
+
+
+def _finite(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"is damaged: {value!r} where a number belongs.")
+    return float(value)
+
+
+def _refuse(constant: str) -> float:
+    raise InputError(f"is damaged: {constant} is no number.")
 
 
 def _tiles(rows: Any, tiling: Tiling) -> dict[int, Tile]:
@@ -239,5 +186,7 @@ def _tiles(rows: Any, tiling: Tiling) -> dict[int, Tile]:
         if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
             raise InputError(f"is damaged: {digest!r} is no checksum.")
         n_bytes, sites, free_sites = (_whole(count, 0) for count in counts)
+        if max(sites, free_sites) > 1 << 3 * tiling.bits:
+            raise InputError(f"is damaged: a tile cannot have {max(sites, free_sites)} sites.")
         tiles[key] = Tile(digest, n_bytes, sites, free_sites)
     return tiles

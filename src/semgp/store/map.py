@@ -2,41 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from semgp.blocks.arrays import F64, I64
-from semgp.blocks.model import BlockModel
-from semgp.classes import Classes
+from semgp.blocks.arrays import I64
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.maps.free_space import FreeSpace
-from semgp.maps.gp import GPSemanticMap, box
-from semgp.maps.occupancy import FREE, OCCUPIED
-from semgp.maps.protocol import NO_FREE_SPACE, query_points, require_classes
-from semgp.maps.settings import require_data
-from semgp.maps.tiles import Arrays
-from semgp.prediction import OccupancyPrediction, Prediction
+from semgp.maps.protocol import require_classes
 from semgp.store.commit import commit
-from semgp.store.contents import describe, in_memory, labelled_positions, space_positions
-from semgp.store.groups import groups, in_order, occupancy_in_order
-from semgp.store.manifest import Settings
+from semgp.store.contents import describe
+from semgp.store.manifest import Manifest
+from semgp.store.settings import Settings
 from semgp.store.store import MapStore
+from semgp.store.tiled_map import TiledMap
 from semgp.store.working_set import WorkingSet
-
-P = TypeVar("P")
 
 MOST_SITES = 4_000_000
 """Sites in memory by default: about 2.5 GB once all of them are solved."""
 
 
-class StoredMap:
+class StoredMap(TiledMap):
     """A map of many blocks in a store: the answers of a `GPSemanticMap` from a part of its memory.
 
     Queries and updates load the tiles that they touch, and drop those not used for longest. Where all tiles that a
@@ -66,8 +54,6 @@ class StoredMap:
         No map there, or no such version; FileFormatError for a damaged manifest.
     """
 
-    kind = "gp"
-
     def __init__(
         self, store: MapStore | str | Path, version: int | None = None, *, most_sites: int = MOST_SITES
     ) -> None:
@@ -75,7 +61,7 @@ class StoredMap:
             raise InputError(f"most_sites must be at least 1, not {most_sites}.")
         self.store = store if isinstance(store, MapStore) else MapStore(store)
         self._base = self.store.manifest(version)
-        self._working = WorkingSet(self.store, self._base, most_sites)
+        super().__init__(WorkingSet(self.store, self._base, most_sites))
         self._clouds = 0
         self._writing, self._is_writing = ExitStack(), False
 
@@ -95,31 +81,6 @@ class StoredMap:
         return cls(store, most_sites=most_sites)
 
     @property
-    def settings(self) -> Settings:
-        """Classes, model and all else that never changes."""
-        return self._base.settings
-
-    @property
-    def classes(self) -> Classes:
-        """The map's classes."""
-        return self.settings.classes
-
-    @property
-    def model(self) -> BlockModel:
-        """The map's model."""
-        return self.settings.model
-
-    @property
-    def free(self) -> FreeSpace | None:
-        """How free space is kept, None where it is not."""
-        return self.settings.free
-
-    @property
-    def resolution(self) -> float:
-        """Edge in metres of the voxels in which the map collects its labels."""
-        return self.settings.resolution
-
-    @property
     def version(self) -> int:
         """The version that the map was opened at, or that it published last."""
         return self._base.number
@@ -134,6 +95,7 @@ class StoredMap:
         """
         require_classes(cloud, self.classes)
         if not len(cloud):
+            self._clouds += 1
             return
         if not self._is_writing:
             self._writing.enter_context(self.store.writing())
@@ -150,51 +112,10 @@ class StoredMap:
         if origin is None:
             return np.empty(0, dtype=np.int64)
         if self.free is None or cloud.origin is None:
-            return tiling.of_points(cloud.points, self.resolution, origin)
+            return tiling.of_points(cloud.points[cloud.labelled], self.resolution, origin)
         ends = np.vstack([cloud.points, cloud.origin])
         tiles = np.array(sorted(working.tiles), dtype=np.int64)
         return tiles[tiling.overlap(tiles, origin, ends.min(axis=0), ends.max(axis=0), self.resolution)]
-
-    def query(self, points: ArrayLike, features: ArrayLike | None = None) -> Prediction:
-        """Return class probabilities and variance at points, see `GPSemanticMap.query`.
-
-        Raises
-        ------
-        InputError
-            Points or features that cannot be used, or a map without a labelled point; FileFormatError for tiles
-            that are damaged.
-        """
-        X = query_points(points)
-        known = None if features is None else np.ascontiguousarray(features, dtype=np.float32)
-        answer = self._working.state.answer
-        return in_order(*self._in_groups(X, lambda s: answer(X[s], None if known is None else known[s])))
-
-    def occupancy(self, points: ArrayLike) -> OccupancyPrediction:
-        """Return whether something is there, see `GPSemanticMap.occupancy`.
-
-        Raises
-        ------
-        InputError
-            Points that cannot be used, or a map that keeps no free space.
-        """
-        self._require_free_space()
-        X, state = query_points(points), self._working.state
-        return occupancy_in_order(*self._in_groups(X, lambda s: state.occupancy_at(X[s])))
-
-    def _in_groups(self, X: F64, answer: Callable[[I64], P]) -> tuple[list[P], list[I64]]:
-        """Answer group by group, each with its tiles in memory; return the answers and their rows."""
-        working = self._working
-        require_data(working.n_sites)
-        assert working.state.origin is not None
-        parts, all_rows = [], []
-        for rows, tiles in groups(
-            X, self.settings.tiling, self.resolution, working.state.origin, self.settings.half_blend,
-            working.sizes, working.most_sites,
-        ):  # fmt: skip
-            working.hold(tiles)
-            parts.append(answer(rows))
-            all_rows.append(rows)
-        return parts, all_rows
 
     def commit(self, note: str = "", *, merge: bool = True) -> int:
         """Publish all updates as the next version, and return its number; without updates, the present one.
@@ -227,11 +148,13 @@ class StoredMap:
         """
         if self._clouds:
             raise InputError("the map has updates that are not committed: commit them first.")
-        newest = self.store.manifest()
-        origin = None if newest.origin is None else np.array(newest.origin, dtype=np.int64)
-        self._working.move_to(newest.tiles, origin, newest.clock)
-        self._base = newest
+        self._go_on_from(self.store.manifest())
         return self.version
+
+    def _go_on_from(self, manifest: Manifest) -> None:
+        origin = None if manifest.origin is None else np.array(manifest.origin, dtype=np.int64)
+        self._working.move_to(manifest.tiles, origin, manifest.clock)
+        self._base, self._clouds = manifest, 0
 
     def close(self) -> None:
         """Let go of the writers' lock. Updates that are not committed stay in memory."""
@@ -246,59 +169,15 @@ class StoredMap:
         try:
             if kind is None:
                 self.commit()
+            else:
+                self._go_on_from(self._base)
         finally:
             self.close()
 
-    def load(self) -> GPSemanticMap:
-        """Return the whole map in memory."""
-        state = self._working.state
-        return in_memory(self.settings, self._working.parts(), state.origin, state.clock)
-
-    def crop(self, low: ArrayLike, high: ArrayLike) -> GPSemanticMap:
-        """Return the map of what lies in a box in memory, see `GPSemanticMap.crop`; other tiles are not touched.
-
-        Raises
-        ------
-        InputError
-            Corners that are not three numbers each, or not in order.
-        """
-        a, b = box(low, high)
-        state = self._working.state
-        parts = self._working.parts(a, b)
-        return in_memory(self.settings, parts, state.origin, state.clock).crop(a, b)
-
     @property
-    def positions(self) -> F64:
-        """Sites (n, 3), metres, world frame."""
-        return self._gathered(labelled_positions)
-
-    @property
-    def occupied_positions(self) -> F64:
-        """Sites (n, 3) at which most rays ended, metres, world frame."""
-        self._require_free_space()
-        return self._gathered(partial(space_positions, label=OCCUPIED))
-
-    @property
-    def free_positions(self) -> F64:
-        """Sites (n, 3) that most rays passed, metres, world frame."""
-        self._require_free_space()
-        return self._gathered(partial(space_positions, label=FREE))
-
-    def _gathered(self, part: Callable[[Settings, Arrays, I64], F64]) -> F64:
-        """The positions in all tiles, which are read one after the other."""
-        origin = self._working.state.origin
-        if origin is None:
-            return np.empty((0, 3))
-        found = [part(self.settings, arrays, origin) for _, arrays in self._working.parts()]
-        return np.concatenate([np.empty((0, 3)), *found])
-
-    def _require_free_space(self) -> None:
-        if self.free is None:
-            raise InputError(NO_FREE_SPACE)
-
-    def __len__(self) -> int:
-        """Return the number of sites of labels, as of the last version or of files written since."""
-        return sum(tile.sites for tile in self._working.tiles.values())
+    def clouds(self) -> int:
+        """How many clouds the map has taken in."""
+        return self._base.clouds + self._clouds
 
     def info(self) -> dict[str, Any]:
         """Return version, model, counts and memory, ready for JSON; tiles are not read."""

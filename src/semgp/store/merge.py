@@ -55,7 +55,8 @@ def _field(prefix: str, base: Arrays, mine: Arrays, theirs: Arrays) -> Arrays:
     full = one + other - before > MOST_MASS
     for name in sums.keys() - {prefix + "voxels"}:
         sums[name][full] = _spread_out(theirs, prefix, name, keys, mine, theirs)[full]
-    return sums
+    kept = sums[prefix + "mass"].any(axis=1)  # others may have gone back to a version without some of the sites
+    return {name: a[kept] for name, a in sums.items()}
 
 
 def _spread_out(arrays: Arrays, prefix: str, name: str, keys: NDArray[np.int64], *like: Arrays) -> NDArray[Any]:

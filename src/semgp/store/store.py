@@ -15,10 +15,12 @@ from semgp.maps.tiles import Arrays
 from semgp.parallel import parallel_map
 from semgp.store.bucket import open_files
 from semgp.store.files import Files
-from semgp.store.manifest import Manifest, Settings, Tile
+from semgp.store.manifest import Manifest, Tile
+from semgp.store.settings import Settings
 from semgp.store.tile_files import decode, encode
 
 _MANIFEST = re.compile(r"([0-9]{8,18})\.json")
+_TILE = re.compile(r"[0-9a-f]{16}-[0-9a-f]{32}\.npz")
 
 
 class MapStore:
@@ -114,7 +116,10 @@ class MapStore:
         data = encode(arrays)
         sites, free_sites = (len(arrays.get(name, ())) for name in ("voxels", "free.voxels"))
         tile = Tile(hashlib.sha256(data).hexdigest(), len(data), sites, free_sites)
-        self.files.create(f"tiles/{tile.name(key)}", data)
+        name = f"tiles/{tile.name(key)}"
+        if not self.files.create(name, data) and self.files.read(name) != data:  # it is damaged
+            self.files.remove(name)
+            self.files.create(name, data)
         return tile
 
     def get(self, key: int, tile: Tile, settings: Settings) -> Arrays:
@@ -162,14 +167,15 @@ class MapStore:
         """
         if keep < 1:
             raise InputError(f"at least one version must be kept, not {keep}.")
+        lock = self.files.lock()
         try:
-            if self.files.start_writing() is False:
+            if lock.alone is False:
                 raise InputError(f"{self.location}: another writer is at work: try again when it has ended.")
             for number in self.numbers()[:-keep]:
                 self.files.remove(_manifest_name(number))
             return self.clean()
         finally:
-            self.files.stop_writing()
+            lock.release()
 
     def clean(self, older: float = 0.0) -> int:
         """Remove tile files that no version lists and that are so many seconds old; return how many.
@@ -177,11 +183,17 @@ class MapStore:
         For a writer that is alone: others may be about to list them. Writers of a folder do it by themselves.
         """
         listed = {t.name(key) for n in self.numbers() for key, t in self.manifest(n).tiles.items()}
-        orphans = [f"tiles/{name}" for name in self.files.names("tiles") if name not in listed]
+        tiles = filter(_TILE.fullmatch, self.files.names("tiles"))  # and nothing that others have put there
+        orphans = [f"tiles/{name}" for name in tiles if name not in listed]
         gone = [name for name in orphans if older == 0 or self.files.age(name) >= older]
         for name in gone:
             self.files.remove(name)
         return self.files.remove_partial() + len(gone)
+
+    def tidy(self) -> None:
+        """Remove what no version lists, where there is no other writer and that can be told."""
+        with self.writing():
+            pass
 
     def check(self, number: int | None = None) -> Iterator[FileFormatError]:
         """Read every tile of a version, and yield what is wrong with those that are damaged."""
@@ -202,14 +214,15 @@ class MapStore:
 
         The first one removes what writers that died have left, where that can be told and all manifests are whole.
         """
+        lock = self.files.lock()
         try:
-            if self.files.start_writing():
+            if lock.alone:
                 with suppress(FileFormatError):
                     self.clean()
-                self.files.share()
+                lock.share()
             yield
         finally:
-            self.files.stop_writing()
+            lock.release()
 
 
 def _manifest_name(number: int) -> str:

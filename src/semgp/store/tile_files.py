@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgp.errors import InputError
-from semgp.readers.npz import DAMAGE, read_npy
+from semgp.readers.npz import DAMAGE, read_member, read_npy
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -67,7 +67,9 @@ def decode(data: bytes, n_classes: Mapping[str, int]) -> Arrays:
             unpacked = sum(member.file_size for member in archive.infolist())
             if unpacked > _SLACK + _RATIO * len(data):
                 raise InputError(f"would unpack to {unpacked:,} bytes: refused as a decompression bomb.")
-            packed = {m.filename.removesuffix(".npy"): read_npy(archive.read(m)) for m in archive.infolist()}
+            packed = {
+                m.filename.removesuffix(".npy"): read_npy(read_member(archive, m)) for m in archive.infolist()
+            }
         return {name: a for prefix, C in n_classes.items() for name, a in _unpacked(packed, prefix, C).items()}
     except InputError:
         raise
@@ -100,6 +102,9 @@ def _unpacked(packed: Arrays, prefix: str, n_classes: int) -> Arrays:
     amounts = arrays[prefix + "mass"]
     if counts.dtype != np.uint16 or labels.dtype != np.uint16 or amounts.dtype != np.uint32:
         raise InputError("is damaged: masses of another type.")
+    sites = arrays[prefix + "voxels"].shape
+    if counts.shape != sites or not counts.all():
+        raise InputError("is damaged: sites without masses.")
     if not (len(labels) == len(amounts) == counts.sum()) or (labels >= n_classes).any():
         raise InputError("is damaged: masses that do not belong to its sites, or classes that the map has not.")
     mass = np.zeros((len(counts), n_classes), dtype=np.uint32)

@@ -73,6 +73,7 @@ class WorkingSet:
             raise FileFormatError(
                 f"{self.store.location}/tiles/{self.tiles[tile].name(tile)}", str(error)
             ) from error
+        self._held[tile] = None
 
     def read(self, tiles: Iterable[int]) -> dict[int, Arrays]:
         """Return the arrays in tiles' files."""
@@ -159,7 +160,9 @@ class WorkingSet:
         self._drop(differ)
         self._changed.clear()
         self.tiles, self.sizes = dict(tiles), _sizes(tiles)
-        if origin is not None:
+        if origin is None:
+            self.state = self.settings.new_state()
+        else:
             self.state.begin(origin, clock)
 
 

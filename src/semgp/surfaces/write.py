@@ -1,4 +1,4 @@
-"""Write meshes as PLY files for viewers such as MeshLab, Blender and CloudCompare."""
+"""Write meshes: PLY for MeshLab, Blender and CloudCompare; GLB for browsers, see `surfaces.glb`."""
 
 from __future__ import annotations
 
@@ -7,30 +7,54 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgp.errors import InputError
+from semgp.surfaces.glb import write_glb
 from semgp.surfaces.mesh import Mesh
 from semgp.writers import atomic_write, coordinates, ply_header, structured
 
+SUFFIXES = (".ply", ".glb")
+"""Names of meshes end in one of these."""
+
+
+def require_mesh_name(path: str | Path) -> str:
+    """Return the suffix of a mesh's name.
+
+    Raises
+    ------
+    InputError
+        A name that ends in none of `SUFFIXES`.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"{path}: meshes are written as {' or '.join(SUFFIXES)}.")
+    return suffix
+
 
 def write_mesh(path: str | Path, mesh: Mesh) -> None:
-    """Write a mesh and what is known of its vertices as a binary little-endian PLY file.
+    """Write a mesh and what is known of its vertices as a binary little-endian PLY file, or as `write_glb` does.
 
-    Vertices have x, y, z (float32, or float64 where that would lose `writers.LARGEST_ROUNDING`), nx, ny, nz, red,
-    green, blue, label, probability, entropy and, where the mesh has it, variance. Comments
-    `semgp class <label> <red> <green> <blue> <name>` name the classes: `semgp.read` takes the vertices for a
-    cloud.
+    In a PLY file, vertices have x, y, z (float32, or float64 where that would lose `writers.LARGEST_ROUNDING`),
+    nx, ny, nz, red, green, blue, label, probability, entropy and, where the mesh has it, variance. Comments `semgp
+    class <label> <red> <green> <blue> <name>` name the classes: `semgp.read` takes the vertices for a cloud.
 
     Parameters
     ----------
     path : str or Path
-        The file, replaced where it exists.
+        A .ply or .glb file, replaced where it exists.
     mesh : Mesh
         The mesh.
 
     Raises
     ------
     InputError
-        A class name that a line of text cannot hold, or a folder that does not exist.
+        Another suffix, a class name that a line of text cannot hold, a folder that does not exist, or what
+        `write_glb` cannot write.
+    MissingExtraError
+        A .glb file without the extra `mesh`.
     """
+    if require_mesh_name(path) == ".glb":
+        write_glb(path, mesh)
+        return
     columns = coordinates(mesh.vertices)
     columns += [(f"n{axis}", values.astype("<f4")) for axis, values in zip("xyz", mesh.normals.T)]
     columns += zip(("red", "green", "blue"), mesh.colours.T)

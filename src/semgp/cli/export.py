@@ -1,0 +1,115 @@
+"""`semgp export`: a map as points, as an OctoMap or as a bag of ROS, for the tools of others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from semgp.blocks.model import BlockModel
+from semgp.cli.console import progress, report
+from semgp.cli.space import spatial_map
+from semgp.errors import InputError
+from semgp.logs.maps import write_map
+from semgp.maps.batches import query_in_batches
+from semgp.maps.files import load_map
+from semgp.maps.gp import GPSemanticMap
+from semgp.maps.octree import to_octomap
+from semgp.maps.points import POINT_WRITERS, point_writer, write_prediction
+from semgp.maps.protocol import SemanticMap
+from semgp.maps.surface import surface_grid
+from semgp.octomap import SemanticOctoMap
+
+OCTOMAP_SUFFIXES = (".bt", ".ot")
+BAG_SUFFIXES = (".mcap", ".db3", ".bag")
+FORMATS = (*POINT_WRITERS, *OCTOMAP_SUFFIXES, *BAG_SUFFIXES)
+
+
+def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> None:
+    """Write a map for other tools: as points along its surface, as an OctoMap, or as a bag of ROS.
+
+    Example: semgp export room.semgp --out room.laz
+
+    Example: semgp export drive.semgp --out map.mcap
+
+    Parameters
+    ----------
+    map_file
+        A map that `semgp build` wrote.
+    out
+        The file to write. Points: .ply, .pcd, .las, .laz or .npz, as `semgp query` writes them. OctoMap: .bt, free
+        or occupied, or .ot, with log-odds and the class colours; for a map with free space (semgp build
+        --free-space) or an OctoMap. Bags: .mcap or .db3 for ROS 2, .bag for ROS 1, with /semantic_map
+        (PointCloud2) and, from maps with free space, /octomap (octomap_msgs).
+    resolution
+        Spacing of the points, or edge of the OctoMap's voxels, in metres; left out, the map's own.
+    """
+    suffix = out.suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError(f"{out}: a map is written as {', '.join(FORMATS)}.")
+    if suffix in BAG_SUFFIXES:
+        _export_bag(map_file, out, resolution)
+    elif suffix in OCTOMAP_SUFFIXES:
+        _export_octomap(map_file, out, resolution)
+    else:
+        _export_points(map_file, out, resolution)
+
+
+def _export_points(map_file: Path, out: Path, resolution: float | None) -> None:
+    point_writer(out)
+    semantic_map = load_map(map_file)
+    if resolution is None:
+        resolution = _resolution(map_file, semantic_map)
+    X = surface_grid(semantic_map.positions, resolution)
+    with progress() as bars:
+        asking = bars.add_task("asking the map", total=len(X))
+        prediction = query_in_batches(semantic_map, X, lambda n, _: bars.update(asking, completed=n))
+    write_prediction(out, X, prediction)
+    report(f"{out}: {len(X):,} points, {resolution:g} m apart", out=out, points=len(X), resolution=resolution)
+
+
+def _export_bag(map_file: Path, out: Path, resolution: float | None) -> None:
+    semantic_map = load_map(map_file)
+    edge = _resolution(map_file, semantic_map) if resolution is None else resolution
+    X = surface_grid(semantic_map.positions, edge)
+    with progress() as bars:
+        bars.add_task(f"querying {len(X):,} points", total=None)
+        octomap = semantic_map if isinstance(semantic_map, SemanticOctoMap) else None
+        if isinstance(semantic_map, GPSemanticMap) and semantic_map.free is not None:
+            octomap = to_octomap(semantic_map, resolution)
+        write_map(out, semantic_map, X, octomap)
+    words = f"{out}: {len(X):,} points, {edge:g} m apart" + ("" if octomap is None else ", and an OctoMap")
+    report(words, out=out, points=len(X), resolution=edge, octomap=octomap is not None)
+
+
+def _resolution(map_file: Path, semantic_map: SemanticMap) -> float:
+    """Return the resolution of a map that has one."""
+    if isinstance(semantic_map, SemanticOctoMap):
+        return semantic_map.resolution
+    if isinstance(semantic_map, GPSemanticMap) and isinstance(semantic_map.model, BlockModel):
+        return semantic_map.model.resolution
+    raise InputError(f"{map_file} has no resolution of its own: give --resolution METRES.")
+
+
+def _export_octomap(map_file: Path, out: Path, resolution: float | None) -> None:
+    semantic_map = spatial_map(map_file)
+    if isinstance(semantic_map, SemanticOctoMap):
+        if resolution not in (None, semantic_map.resolution):
+            raise InputError(
+                f"{map_file} is an OctoMap of {semantic_map.resolution:g} m, and is written as it is."
+            )
+        octomap = semantic_map
+    else:
+        with progress() as bars:
+            bars.add_task("asking for the voxels", total=None)
+            octomap = to_octomap(semantic_map, resolution)
+    octomap.write(out, "class" if out.suffix.lower() == ".ot" else None)
+    occupied, free = len(octomap.occupied_positions), len(octomap.free_positions)
+    text = f"{out}: {occupied:,} occupied and {free:,} free voxels"
+    if octomap.origin.any():
+        text += f", coordinates from {', '.join(f'{v:.12g}' for v in octomap.origin)} m"
+    report(
+        f"{text}, of {octomap.resolution:g} m",
+        out=out,
+        occupied=occupied,
+        free=free,
+        resolution=octomap.resolution,
+    )

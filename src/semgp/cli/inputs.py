@@ -1,0 +1,235 @@
+"""The options of every command that reads scans, and the scans that they mean."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from semgp.class_files import ClassFile, class_list, read_class_file
+from semgp.classes import Classes
+from semgp.cli.console import MANNERS, STDERR
+from semgp.cloud import LabelledCloud
+from semgp.errors import InputError
+from semgp.logs.scans import LogScans
+from semgp.readers import Scans, open_scans
+from semgp.remapping import remapped, without_counterpart
+from semgp.segmentation import labelled_scans, segmenter_of
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """How scans are read: options shared by the commands that read labelled scans.
+
+    Parameters
+    ----------
+    classes
+        What the labels in the files mean: a class file (.toml, .csv, SemanticKITTI .yaml), a built-in list
+        (nyu13, nyu40, scannet, semantickitti, ade20k), or the number of classes. Left out, what the files say;
+        where they only number their classes, all of them are read once more to know how many.
+    remap
+        Turn the classes into others: a class file that says which each one takes in (from).
+    labels
+        Which labels of a data set: labels (the truth), predictions, or a folder of label files or images.
+    network
+        Label the frames of RGB-D recordings by a segmentation network, a .tflite or .onnx file, as "semgp segment"
+        does; --classes are then the network's.
+    stride
+        Take every N-th pixel of every N-th row of RGB-D recordings; left out, so many that 80,000 remain at most.
+    max_depth
+        Depths of RGB-D recordings beyond so many metres are not believed; left out, 10.
+    depth_scale
+        Units a metre of the depth images of RGB-D recordings; left out, 1000, or 5000 for TUM's.
+    field
+        Field of point files that holds the labels, where it is not called label, class or classification.
+    poses
+        Trajectory of the sensor, TUM's or KITTI's, for a folder of point files in the sensor's frame; or other
+        poses of the camera for a SemanticKITTI sequence.
+    topic
+        Robot logs: topic of labelled PointCloud2, where there are several; "semgp topics" lists them.
+    frame
+        Robot logs: the fixed frame that the map is in; left out, the root of tf above the sensor.
+    odometry
+        Robot logs: topic of nav_msgs/Odometry or of poses that says where the robot was, instead of tf.
+    pose_frame
+        Robot logs: the frame that these poses are of, where the messages do not say.
+    max_gap
+        Robot logs: poses are interpolated between samples at most so many seconds apart; left out, 1.
+    depth
+        Robot logs: instead of clouds, topic of depth images; --labels is then the topic of label images.
+    camera_info
+        Robot logs: topic of the CameraInfo of the depth images.
+    colour
+        Robot logs: topic of colour images that go with the depth.
+    first
+        Number of the first scan that is taken, counted from 0 over all paths.
+    last
+        Number of the last scan that is taken.
+    every
+        Take every N-th scan only.
+    """
+
+    classes: str | None = None
+    remap: Path | None = None
+    labels: str | None = None
+    network: Path | None = None
+    stride: int | None = None
+    max_depth: float | None = None
+    depth_scale: float | None = None
+    field: str | None = None
+    poses: Path | None = None
+    topic: str | None = None
+    frame: str | None = None
+    odometry: str | None = None
+    pose_frame: str | None = None
+    max_gap: float | None = None
+    depth: str | None = None
+    camera_info: str | None = None
+    colour: str | None = None
+    first: int = 0
+    last: int | None = None
+    every: int = 1
+
+
+AnyInputs = Annotated[Inputs, Parameter(name="*", group="Scans")]
+"""The type of a command's parameter `inputs`: its options stand beside the command's own."""
+
+PLAIN = Inputs()
+"""Every scan, as its file says."""
+
+_ABOUT_SCANS = ("classes", "remap", "network", "first", "last", "every")
+"""Options that this module works on; the others go to the readers as they are."""
+
+
+def sources(paths: Sequence[Path], inputs: Inputs = PLAIN) -> Scans:
+    """Return the scans at some paths, one after the other, each read when it is asked for and none kept.
+
+    Raises
+    ------
+    InputError
+        No paths, options that a format does not have, or no scans left. While scans are read: damaged files, and
+        classes that differ from the first scan's.
+    """
+    if not paths:
+        raise InputError("give at least one scan: a point file or a data-set folder.")
+    options: dict[str, Any] = {
+        f.name: getattr(inputs, f.name) for f in fields(inputs) if f.name not in _ABOUT_SCANS
+    }
+    options = {name: value for name, value in options.items() if value is not None}
+    if inputs.classes is not None:
+        options["classes"] = class_list(inputs.classes)
+    mapping = None if inputs.remap is None else read_class_file(inputs.remap)
+    if inputs.network is None:
+        parts = [open_scans(path, **options) for path in paths]
+    else:
+        segmenter = segmenter_of(inputs.network, options.pop("classes", None), mapping)
+        parts = [labelled_scans(path, open_scans(path, **options), segmenter) for path in paths]
+        mapping = None  # the segmenter has it
+    for path, part in zip(paths, parts):
+        if isinstance(part, LogScans) and part.skipped:
+            why = part.skipped[0][1]
+            STDERR.print(f"{path}: {len(part.skipped)} scans skipped, the first because {why}", markup=False)
+    chosen = _chosen(sum(len(part) for part in parts), inputs)
+    return Scans(chosen, _Reading(parts, chosen, mapping, count_classes=inputs.classes is None))
+
+
+def at_most(scans: Scans, count: int, stride: int) -> Scans:
+    """Return at most `count` of the scans, from the middle of the sequence, at most `stride` apart.
+
+    So few that they fit in memory, so close that they still see the same places.
+    """
+    step = min(max(1, len(scans) // count), stride)
+    begin = max(0, (len(scans) - count * step) // 2)
+    return scans[begin : begin + count * step : step]
+
+
+def dropped_labels(scans: Scans) -> dict[str, int]:
+    """Return how many labels of each class --remap has dropped from the `sources` that were read so far."""
+    return dict(scans.scan.dropped) if isinstance(scans.scan, _Reading) else {}
+
+
+def tell_dropped(scans: Scans) -> None:
+    """Tell on standard error which labels --remap has dropped; say nothing where it dropped none."""
+    if (dropped := dropped_labels(scans)) and not MANNERS.quiet:
+        words = ", ".join(f"{n:,} of {name}" for name, n in sorted(dropped.items(), key=lambda item: -item[1]))
+        STDERR.print(
+            f"labels that --remap has no class for: {words}", markup=False, highlight=False, soft_wrap=True
+        )
+
+
+def _chosen(n: int, inputs: Inputs) -> range:
+    if not n:
+        raise InputError("there are no scans at the paths that were given.")
+    first, last, every = inputs.first, inputs.last, inputs.every
+    if every < 1 or first < 0 or (last is not None and last < first):
+        raise InputError("--every is at least 1, --first at least 0, and --last not below --first.")
+    if first >= n:
+        raise InputError(f"there is no scan {first}: there are {n}, counted from 0.")
+    return range(n)[first : None if last is None else last + 1 : every]
+
+
+class _Reading:
+    """Reads scan k of several sequences, all in the same classes."""
+
+    def __init__(
+        self,
+        parts: Sequence[Sequence[LabelledCloud]],
+        chosen: Sequence[int],
+        mapping: ClassFile | None,
+        count_classes: bool,
+    ) -> None:
+        self._parts, self._chosen, self._mapping, self._count_classes = parts, chosen, mapping, count_classes
+        self._counted: set[int] = set()
+        self.dropped: Counter[str] = Counter()
+        self._starts = np.cumsum([0] + [len(part) for part in parts]).tolist()
+        self._classes: Classes | None = None if mapping is None else mapping.classes
+
+    def __call__(self, k: int) -> LabelledCloud:
+        cloud = self._read(k)
+        if self._classes is None:
+            first = cloud if k == self._chosen[0] else self._read(self._chosen[0])
+            self._classes = (
+                self._most_classes() if first.classes.nameless and self._count_classes else first.classes
+            )
+        return cloud if cloud.classes == self._classes else in_classes(cloud, self._classes, f"scan {k}")
+
+    def _most_classes(self) -> Classes:
+        """Return the classes of a scan that names them or, where none does, the most that any scan has."""
+        return max((self._read(k).classes for k in self._chosen), key=lambda c: (not c.nameless, len(c)))
+
+    def _read(self, k: int) -> LabelledCloud:
+        part = bisect_right(self._starts, k) - 1
+        cloud: LabelledCloud = self._parts[part][k - self._starts[part]]
+        if self._mapping is None:
+            return cloud
+        if k not in self._counted:
+            self._counted.add(k)
+            self.dropped.update(without_counterpart(cloud, self._mapping))
+        return remapped(cloud, self._mapping)
+
+
+def in_classes(cloud: LabelledCloud, classes: Classes, what: str) -> LabelledCloud:
+    """Return a cloud in the classes that are wanted: by name or, where it only numbers its own, by number.
+
+    Raises
+    ------
+    InputError
+        A cloud of other classes.
+    """
+    own = cloud.classes
+    if set(own.names) <= set(classes.names):
+        return remapped(cloud, ClassFile(classes))
+    if own.nameless and len(own) <= len(classes):
+        more = len(classes) - len(own)
+        weights = None if cloud.weights is None else np.pad(cloud.weights, ((0, 0), (0, more)))
+        return replace(cloud, classes=classes, weights=weights)
+    raise InputError(
+        f"the classes of {what} ({', '.join(own.names)}) are not those wanted ({', '.join(classes.names)}): "
+        "say what its labels mean with --classes, or turn them into the others with --remap."
+    )

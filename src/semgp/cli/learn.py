@@ -1,0 +1,114 @@
+"""`semgp learn`: scans to the model of a map."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from rich.progress import Progress
+
+from semgp.blocks.learning import learn_from_scans
+from semgp.blocks.model import BlockModel
+from semgp.cli.console import progress, report
+from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources
+from semgp.cloud import LabelledCloud
+from semgp.errors import FileFormatError, InputError
+from semgp.gp.model import GPModel
+from semgp.maps.learning import learn_model
+from semgp.maps.presets import PRESETS, with_vertical
+from semgp.writers import atomic_write
+
+Axis = Literal["x", "y", "z"]
+PAPER = "paper"
+"""The name of the whole-scan GP among the models."""
+
+SAMPLE = (20, 5)
+"""A block model is learned from so many scans at most, at most every so many apart."""
+
+
+def learn(
+    scans: list[Path],
+    /,
+    *,
+    out: Path,
+    inputs: AnyInputs = PLAIN,
+    model: str = "outdoor-lidar",
+    resolution: float | None = None,
+    vertical: Axis = "z",
+    seed: int = 0,
+) -> None:
+    """Learn a block model from a sequence of labelled scans, and write it as JSON for "semgp build --model".
+
+    Example: semgp learn sequences/08 --out drive.json
+
+    Parameters
+    ----------
+    scans
+        Point files or data-set folders: two scans of one place at least, in the order in which they were taken.
+        Their labels may be wrong: they judge each other. Of long sequences, 20 scans from the middle are taken,
+        five apart.
+    out
+        The model file to write.
+    model
+        Where to begin: general, indoor-rgbd, indoor-labels, outdoor-lidar, or a model file.
+    resolution
+        Edge in metres of the voxels in which labels are added up, instead of the model's.
+    vertical
+        The axis of gravity in the scans' world.
+    seed
+        Seed of every random draw.
+    """
+    clouds = sources(scans, inputs)
+    with progress() as bars:
+        start = block_model(model, resolution, vertical)
+        learned = learn_blocks(at_most(clouds, *SAMPLE), start, vertical, seed, bars)
+    with atomic_write(out) as temporary:
+        temporary.write_text(json.dumps(learned.to_json(), indent=2) + "\n")
+    report(
+        f"{out}: a model from {len(clouds)} scans; use it with semgp build --model {out}",
+        out=out,
+        scans=len(clouds),
+    )
+
+
+def block_model(name: str, resolution: float | None, vertical: Axis) -> BlockModel:
+    """Return a preset turned to the world's vertical, or the model in a file as it is."""
+    if name in PRESETS:
+        model = with_vertical(PRESETS[name], "xyz".index(vertical))
+    elif name.endswith(".json"):
+        path = Path(name)
+        try:
+            model = BlockModel.from_json(json.loads(path.read_text()))
+        except OSError as error:
+            raise FileFormatError(path, f"cannot be read: {error.strerror or error}.") from error
+        except (ValueError, InputError) as error:
+            raise FileFormatError(path, f"is no model: {error}") from error
+    else:
+        raise InputError(f"--model must be one of {', '.join(PRESETS)}, {PAPER}, or a .json file, not {name!r}.")
+    return model if resolution is None else replace(model, resolution=resolution)
+
+
+def learn_blocks(
+    sources: Sequence[LabelledCloud], model: BlockModel, vertical: Axis, seed: int, bars: Progress
+) -> BlockModel:
+    """Return a model learned from scans, with progress."""
+    bar = bars.add_task("learning the model", total=None)
+
+    def show(n: int, loss: float) -> None:
+        bars.update(bar, description=f"learning the model: {n} evaluations, log-loss {loss:.4f}")
+
+    return learn_from_scans(sources, model, vertical="xyz".index(vertical), seed=seed, progress=show)[0]
+
+
+def learn_paper(sources: Sequence[LabelledCloud], model: GPModel, iterations: int, bars: Progress) -> GPModel:
+    """Return the paper's GP with hyperparameters learned from the first labelled scan."""
+    bar = bars.add_task("learning hyperparameters", total=None)
+    first = next((cloud for cloud in sources if cloud.labelled.any()), sources[0])
+
+    def show(n: int, nlml: float) -> None:
+        bars.update(bar, description=f"learning hyperparameters: {n} evaluations, NLML {nlml:.1f}")
+
+    return learn_model(first, model, max_iterations=iterations, progress=show)[0]
