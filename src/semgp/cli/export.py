@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from semgp.blocks.model import BlockModel
 from semgp.cli.console import progress, report
 from semgp.cli.space import spatial_map
 from semgp.errors import InputError
 from semgp.logs.maps import write_map
+from semgp.maps.abilities import as_spatial, resolution_of
 from semgp.maps.batches import query_in_batches
 from semgp.maps.files import load_map
-from semgp.maps.gp import GPSemanticMap
+from semgp.maps.grid import write_grid
 from semgp.maps.octree import to_octomap
 from semgp.maps.points import POINT_WRITERS, point_writer, write_prediction
 from semgp.maps.protocol import SemanticMap
@@ -20,11 +20,12 @@ from semgp.octomap import SemanticOctoMap
 
 OCTOMAP_SUFFIXES = (".bt", ".ot")
 BAG_SUFFIXES = (".mcap", ".db3", ".bag")
-FORMATS = (*POINT_WRITERS, *OCTOMAP_SUFFIXES, *BAG_SUFFIXES)
+GRID_SUFFIX = ".zarr"
+FORMATS = (*POINT_WRITERS, *OCTOMAP_SUFFIXES, *BAG_SUFFIXES, GRID_SUFFIX)
 
 
 def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> None:
-    """Write a map for other tools: as points along its surface, as an OctoMap, or as a bag of ROS.
+    """Write a map for other tools: as points along its surface, an OctoMap, a dense grid, or a bag of ROS.
 
     Example: semgp export room.semgp --out room.laz
 
@@ -38,14 +39,17 @@ def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> 
         The file to write. Points: .ply, .pcd, .las, .laz or .npz, as `semgp query` writes them. OctoMap: .bt, free
         or occupied, or .ot, with log-odds and the class colours; for a map with free space (semgp build
         --free-space) or an OctoMap. Bags: .mcap or .db3 for ROS 2, .bag for ROS 1, with /semantic_map
-        (PointCloud2) and, from maps with free space, /octomap (octomap_msgs).
+        (PointCloud2) and, from maps with free space, /octomap (octomap_msgs). Grids: .zarr, a folder of dense
+        arrays of labels, probabilities, variance and, where there is, occupancy.
     resolution
-        Spacing of the points, or edge of the OctoMap's voxels, in metres; left out, the map's own.
+        Spacing of the points, or edge of the voxels, in metres; left out, the map's own.
     """
     suffix = out.suffix.lower()
     if suffix not in FORMATS:
         raise InputError(f"{out}: a map is written as {', '.join(FORMATS)}.")
-    if suffix in BAG_SUFFIXES:
+    if suffix == GRID_SUFFIX:
+        _export_grid(map_file, out, resolution)
+    elif suffix in BAG_SUFFIXES:
         _export_bag(map_file, out, resolution)
     elif suffix in OCTOMAP_SUFFIXES:
         _export_octomap(map_file, out, resolution)
@@ -73,20 +77,29 @@ def _export_bag(map_file: Path, out: Path, resolution: float | None) -> None:
     with progress() as bars:
         bars.add_task(f"querying {len(X):,} points", total=None)
         octomap = semantic_map if isinstance(semantic_map, SemanticOctoMap) else None
-        if isinstance(semantic_map, GPSemanticMap) and semantic_map.free is not None:
-            octomap = to_octomap(semantic_map, resolution)
+        spatial = as_spatial(semantic_map)
+        if octomap is None and spatial is not None:
+            octomap = to_octomap(spatial, resolution)
         write_map(out, semantic_map, X, octomap)
     words = f"{out}: {len(X):,} points, {edge:g} m apart" + ("" if octomap is None else ", and an OctoMap")
     report(words, out=out, points=len(X), resolution=edge, octomap=octomap is not None)
 
 
+def _export_grid(map_file: Path, out: Path, resolution: float | None) -> None:
+    semantic_map = load_map(map_file)
+    edge = _resolution(map_file, semantic_map) if resolution is None else resolution
+    with progress() as bars:
+        bar = bars.add_task("asking the map, chunk by chunk", total=None)
+        shape = write_grid(semantic_map, out, edge, lambda n, total: bars.update(bar, completed=n, total=total))
+    report(f"{out}: {' x '.join(map(str, shape))} voxels of {edge:g} m", out=out, shape=shape, resolution=edge)
+
+
 def _resolution(map_file: Path, semantic_map: SemanticMap) -> float:
     """Return the resolution of a map that has one."""
-    if isinstance(semantic_map, SemanticOctoMap):
-        return semantic_map.resolution
-    if isinstance(semantic_map, GPSemanticMap) and isinstance(semantic_map.model, BlockModel):
-        return semantic_map.model.resolution
-    raise InputError(f"{map_file} has no resolution of its own: give --resolution METRES.")
+    resolution = resolution_of(semantic_map)
+    if resolution is None:
+        raise InputError(f"{map_file} has no resolution of its own: give --resolution METRES.")
+    return resolution
 
 
 def _export_octomap(map_file: Path, out: Path, resolution: float | None) -> None:

@@ -177,17 +177,13 @@ def spatial_map(path: Path) -> SpatialMap:
     InputError
         A map that does not; FileFormatError where the file is none.
     """
+    from semgp.maps.abilities import as_spatial
     from semgp.maps.files import load_map
-    from semgp.maps.gp import GPSemanticMap
-    from semgp.octomap import SemanticOctoMap
-    from semgp.store.map import StoredMap
 
-    semantic_map = load_map(path)
-    if isinstance(semantic_map, SemanticOctoMap) or (
-        isinstance(semantic_map, GPSemanticMap | StoredMap) and semantic_map.free is not None
-    ):
-        return semantic_map
-    raise InputError(f"{path} keeps no free space: build it with semgp build --free-space.")
+    spatial = as_spatial(load_map(path))
+    if spatial is None:
+        raise InputError(f"{path} keeps no free space: build it with semgp build --free-space.")
+    return spatial
 
 
 def _costs(path: Path) -> dict[str, int]:
