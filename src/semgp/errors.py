@@ -1,6 +1,7 @@
 """The errors that semgp raises on purpose; everything else is a bug."""
 
 from pathlib import Path
+from typing import Self
 
 
 class SemgpError(Exception):
@@ -25,6 +26,11 @@ class FileFormatError(InputError):
     def __init__(self, path: str | Path, problem: str) -> None:
         super().__init__(f"{path}: {problem}")
         self.path = Path(path)
+        self._parts = path, problem
+
+    def __reduce__(self) -> tuple[type[Self], tuple[str | Path, str]]:
+        """Pickle: errors come back from other processes."""
+        return type(self), self._parts
 
 
 class MissingExtraError(SemgpError, ImportError):
@@ -40,7 +46,16 @@ class MissingExtraError(SemgpError, ImportError):
 
     def __init__(self, feature: str, extra: str) -> None:
         super().__init__(f"{feature} needs an optional dependency: pip install 'semgp[{extra}]'")
+        self._parts = feature, extra
+
+    def __reduce__(self) -> tuple[type[Self], tuple[str, str]]:
+        """Pickle: errors come back from other processes."""
+        return type(self), self._parts
 
 
 class ConflictError(SemgpError):
     """Another writer was faster: what was to be written is still there, to be merged or written anew."""
+
+
+class ExecutorError(SemgpError):
+    """Workers that died again and again, or that cannot be reached any more; what they wrote can be used."""

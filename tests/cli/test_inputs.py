@@ -220,7 +220,7 @@ def test_commands_take_the_options(
     options = ("--remap", tmp_path / "mine.csv", "--first", "1", "--no-learn", "--quiet")
     assert run("build", *scans, "--out", out, "--kind", "knn", *options) == 0
     capsys.readouterr()
-    assert run("evaluate", out, "--truth", scans[0], "--remap", tmp_path / "mine.csv", "--json", "-") == 0
+    assert run("evaluate", out, "--truth", scans[0], "--remap", tmp_path / "mine.csv", "--json") == 0
     captured = capsys.readouterr()
     assert '"accuracy"' in captured.out
     assert f"has no class for: {(corner[::3].hard_labels == 1).sum()} of class 1" in captured.err

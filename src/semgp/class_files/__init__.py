@@ -14,6 +14,7 @@ the yaml of SemanticKITTI, with labels, learning_map, learning_map_inv and color
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from semgp.class_files.csv_format import read_csv, write_csv
@@ -21,10 +22,10 @@ from semgp.class_files.rows import ClassFile
 from semgp.class_files.semantic_kitti_yaml import read_semantic_kitti_yaml
 from semgp.class_files.toml_format import read_toml, write_toml
 from semgp.classes import Classes
-from semgp.conventions import CLASS_LISTS
+from semgp.conventions import ADE20K_32, ADE20K_32_TO_NYU13, CLASS_LISTS, NYU13, NYU40, NYU40_TO_NYU13
 from semgp.errors import InputError
 
-__all__ = ["ClassFile", "class_list", "read_class_file", "write_class_file"]
+__all__ = ["REMAPPINGS", "ClassFile", "class_list", "read_class_file", "remapping", "write_class_file"]
 
 READERS = {
     ".toml": read_toml,
@@ -64,6 +65,28 @@ def write_class_file(path: str | Path, classes: Classes | ClassFile) -> None:
         raise InputError(f"{path}: class files are written as {' or '.join(WRITERS)}.")
     content = classes if isinstance(classes, ClassFile) else ClassFile(Classes(classes.names, classes.colours))
     WRITERS[path.suffix.lower()](path, content)
+
+
+REMAPPINGS: Mapping[str, ClassFile] = {
+    "ade20k-32-to-nyu13": ClassFile.from_table(ADE20K_32, NYU13, ADE20K_32_TO_NYU13),
+    "nyu40-to-nyu13": ClassFile.from_table(NYU40, NYU13, NYU40_TO_NYU13),
+}
+"""The remappings that users name."""
+
+
+def remapping(name: str | Path) -> ClassFile:
+    """Return a remapping: a built-in one by name, or that of a class file by path.
+
+    Raises
+    ------
+    InputError
+        Nothing of that name; FileFormatError for a class file that is damaged.
+    """
+    if str(name).lower() in REMAPPINGS:
+        return REMAPPINGS[str(name).lower()]
+    if not Path(name).suffix:
+        raise InputError(f"no remapping is called {name!s}: give a class file, or one of {', '.join(REMAPPINGS)}.")
+    return read_class_file(name)
 
 
 def class_list(name: str) -> Classes:

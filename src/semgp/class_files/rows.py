@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from semgp.classes import Classes, repeated
 from semgp.errors import FileFormatError, InputError
 
@@ -42,6 +45,12 @@ class ClassFile:
             raise InputError(f"{len(self.classes)} classes but members for {len(self.members)}.")
         if twice := sorted(repeated(chain.from_iterable(self.members))):
             raise InputError(f"{twice[0]!r} becomes more than one class.")
+
+    @classmethod
+    def from_table(cls, source: Classes, target: Classes, table: NDArray[np.int32]) -> ClassFile:
+        """Return the remapping that a table from one list's labels to the other's stands for."""
+        members = (tuple(np.array(source.names)[table == label].tolist()) for label in range(len(target)))
+        return cls(target, tuple(members))
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import sys
 import traceback
+import warnings
 from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Group, Parameter
+from rich.markup import escape
 
 from semgp.cli.console import MANNERS, STDERR, behave
 from semgp.cli.reproduce import reproduce
@@ -69,11 +71,18 @@ def launch(
     return app(tokens)
 
 
+def _tell(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Show a warning as one line for people."""
+    if not MANNERS.quiet:
+        STDERR.print(f"[yellow]warning:[/] {escape(str(message))}", highlight=False, soft_wrap=True)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run one command; exit with 0, with 2 after bad input, with 130 after Ctrl-C."""
     tokens = sys.argv[1:] if arguments is None else arguments
     if not tokens or tokens[0] in app.help_flags:
         app.resolved_commands()  # the list of commands shows what each one's docstring says
+    warnings.showwarning = _tell
     try:
         app.meta(tokens, exit_on_error=False, print_error=True)
     except CycloptsError:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from semgp.class_files import ClassFile, class_list, read_class_file
+from semgp.class_files import ClassFile, class_list, remapping
 from semgp.classes import Classes
 from semgp.cli.console import MANNERS, STDERR
 from semgp.cloud import LabelledCloud
@@ -34,7 +34,8 @@ class Inputs:
         (nyu13, nyu40, scannet, semantickitti, ade20k), or the number of classes. Left out, what the files say;
         where they only number their classes, all of them are read once more to know how many.
     remap
-        Turn the classes into others: a class file that says which each one takes in (from).
+        Turn the classes into others: a class file that says which each one takes in (from), or a built-in
+        remapping (ade20k-32-to-nyu13, nyu40-to-nyu13).
     labels
         Which labels of a data set: labels (the truth), predictions, or a folder of label files or images.
     network
@@ -76,7 +77,7 @@ class Inputs:
     """
 
     classes: str | None = None
-    remap: Path | None = None
+    remap: str | None = None
     labels: str | None = None
     network: Path | None = None
     stride: int | None = None
@@ -124,7 +125,7 @@ def sources(paths: Sequence[Path], inputs: Inputs = PLAIN) -> Scans:
     options = {name: value for name, value in options.items() if value is not None}
     if inputs.classes is not None:
         options["classes"] = class_list(inputs.classes)
-    mapping = None if inputs.remap is None else read_class_file(inputs.remap)
+    mapping = None if inputs.remap is None else remapping(inputs.remap)
     if inputs.network is None:
         parts = [open_scans(path, **options) for path in paths]
     else:

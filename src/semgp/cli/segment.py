@@ -15,7 +15,7 @@ def segment(
     *,
     model: Annotated[Path, Parameter(name=("--model", "--network"))],
     out: Path,
-    labels: Annotated[Path | None, Parameter(name=("--labels", "--remap"))] = None,
+    labels: Annotated[str | None, Parameter(name=("--labels", "--remap"))] = None,
     classes: str | None = None,
     soft: bool = True,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
@@ -25,8 +25,7 @@ def segment(
     "semgp build FOLDER --labels OUT" takes them. Images that have labels there already are left out, so that the
     same command goes on after an interruption.
 
-    Example: semgp segment recording --model net.tflite --classes ade20k-32 --labels nyu13.toml --out
-    recording/labels
+    Example: semgp segment recording --model net.tflite --labels nyu13.toml --out recording/labels
 
     Example: semgp segment "photos/*.jpg" --model net.onnx --out labels
 
@@ -41,8 +40,8 @@ def segment(
     out
         The folder to write to.
     labels
-        The classes of the map: a class file that says which of the network's classes each takes in (from). Left
-        out, the network's classes.
+        The classes of the map: a class file that says which of the network's classes each takes in (from), or a
+        built-in remapping (ade20k-32-to-nyu13, nyu40-to-nyu13). Left out, the network's classes.
     classes
         The network's classes: a built-in list, a class file, or their number. Left out, those of the model's TOML,
         or else numbers.
@@ -51,7 +50,7 @@ def segment(
     overwrite
         Label images again that have labels in the folder.
     """
-    from semgp.class_files import class_list, read_class_file
+    from semgp.class_files import class_list, remapping
     from semgp.cli.console import keeping, progress, report
     from semgp.segmentation import images_of, segmenter_of
     from semgp.segmentation.folder import segment_images, unlabelled
@@ -59,7 +58,7 @@ def segment(
     segmenter = segmenter_of(
         model,
         None if classes is None else class_list(classes),
-        None if labels is None else read_class_file(labels),
+        None if labels is None else remapping(labels),
     )
     paths = [image for path in images for image in images_of(path)]
     left = unlabelled(paths, out)

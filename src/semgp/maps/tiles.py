@@ -110,6 +110,8 @@ def cut(state: ManyBlocks, tiling: Tiling, tiles: I64) -> dict[int, Arrays]:
         for tile, mine in found.items():
             rows = parts[tile]
             mine |= {prefix + name: arrays[name][rows] for name in _ROWS if name in arrays}
+            if "spread" in arrays and not arrays["spread"][rows].any():
+                del mine[prefix + "spread"]  # the same bytes, whatever else was in memory
             if times:
                 rows = times[tile]
                 mine[prefix + "cells"] = arrays["cells"][rows]
