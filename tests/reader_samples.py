@@ -87,7 +87,10 @@ def write_log(folder: Path) -> Path:
     poses = [np.block([[np.eye(3), np.full((3, 1), step)], [np.zeros((1, 3)), 1]]) for step in range(3)]
     clouds = [
         LabelledCloud(
-            rng.normal(size=(20, 3)), Classes(("road", "car")), rng.integers(-1, 2, 20), T_world_sensor=T
+            rng.normal(size=(20, 3)),
+            Classes(("road", "car")),
+            rng.integers(-1, 2, 20).astype(np.int32),
+            T_world_sensor=T,
         )
         for T in poses
     ]

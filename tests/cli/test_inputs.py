@@ -192,7 +192,7 @@ def test_remapping_brings_sources_together(tmp_path: Path) -> None:
     ]
     mapping = ClassFile(Classes(("thing", "ground")), (("car", "vehicle"), ("road", "street")))
     write_class_file(tmp_path / "mine.toml", mapping)
-    clouds = sources(paths, Inputs(remap=tmp_path / "mine.toml"))
+    clouds = sources(paths, Inputs(remap=str(tmp_path / "mine.toml")))
     for _ in range(2):  # counted once, however often they are read
         assert [cloud.hard_labels.tolist() for cloud in clouds] == [[1, 0, 0], [1, 0, MISSING, MISSING]]
         assert dropped_labels(clouds) == {"sky": 2}

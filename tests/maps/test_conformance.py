@@ -21,10 +21,10 @@ from semgp.maps.forgetting import Forgetting
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.gp import GPSemanticMap
 from semgp.maps.kinds import MAP_KINDS
-from semgp.maps.protocol import SemanticMap
+from semgp.maps.protocol import SerialisableMap
 from semgp.octomap import SemanticOctoMap
 
-MAKERS: dict[str, Callable[[Classes], SemanticMap]] = {
+MAKERS: dict[str, Callable[[Classes], SerialisableMap]] = {
     "gp": lambda classes: GPSemanticMap(classes, BlockModel(resolution=0.02)),
     "gp, whole scan": lambda classes: GPSemanticMap(classes, GPModel(n_inducing=60)),
     "gp, vote": lambda classes: GPSemanticMap(classes, BlockModel(resolution=0.02, posterior="vote")),
@@ -48,25 +48,25 @@ def test_every_kind_has_a_row() -> None:
 
 
 @pytest.fixture(params=MAKERS)
-def make(request: pytest.FixtureRequest) -> Callable[[Classes], SemanticMap]:
+def make(request: pytest.FixtureRequest) -> Callable[[Classes], SerialisableMap]:
     return MAKERS[request.param]
 
 
-def built(make: Callable[[Classes], SemanticMap], *clouds: LabelledCloud) -> SemanticMap:
+def built(make: Callable[[Classes], SerialisableMap], *clouds: LabelledCloud) -> SerialisableMap:
     semantic_map = make(clouds[0].classes)
     for cloud in clouds:
         semantic_map.update(cloud)
     return semantic_map
 
 
-def test_it_learns_its_labels(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_it_learns_its_labels(make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
     prediction = built(make, corner).query(corner.points)
     known = corner.labelled & prediction.observed
     assert known.sum() > 0.95 * corner.labelled.sum()
     assert (prediction.label[known] == corner.hard_labels[known]).mean() > 0.95
 
 
-def test_rows_are_probabilities(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_rows_are_probabilities(make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
     rng = np.random.default_rng(1)
     near_and_far = np.vstack([corner.points, rng.uniform(-50, 50, (100, 3))])
     prediction = built(make, corner).query(near_and_far)
@@ -78,7 +78,7 @@ def test_rows_are_probabilities(make: Callable[[Classes], SemanticMap], corner: 
         assert (prediction.variance >= 0).all()
 
 
-def test_two_updates_equal_one(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_two_updates_equal_one(make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
     once = built(make, corner)
     halves = built(make, corner[1::2], corner[::2])
     np.testing.assert_allclose(
@@ -87,7 +87,7 @@ def test_two_updates_equal_one(make: Callable[[Classes], SemanticMap], corner: L
 
 
 def test_soft_one_hot_labels_equal_hard_ones(
-    make: Callable[[Classes], SemanticMap], corner: LabelledCloud
+    make: Callable[[Classes], SerialisableMap], corner: LabelledCloud
 ) -> None:
     soft = replace(corner, labels=None, weights=corner.class_weights)
     hard = built(make, corner).query(corner.points)
@@ -95,7 +95,7 @@ def test_soft_one_hot_labels_equal_hard_ones(
 
 
 def test_files_give_the_same_map_to_the_last_bit(
-    make: Callable[[Classes], SemanticMap], corner: LabelledCloud, tmp_path: Path
+    make: Callable[[Classes], SerialisableMap], corner: LabelledCloud, tmp_path: Path
 ) -> None:
     semantic_map = built(make, corner)
     before = semantic_map.query(corner.points)
@@ -113,7 +113,9 @@ def test_files_give_the_same_map_to_the_last_bit(
     assert len(loaded) >= len(semantic_map)
 
 
-def test_utm_coordinates_keep_their_digits(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_utm_coordinates_keep_their_digits(
+    make: Callable[[Classes], SerialisableMap], corner: LabelledCloud
+) -> None:
     if make is MAKERS["octomap"]:
         pytest.skip("OctoMap's keys reach 32,768 voxels from the origin; tests/test_octomap.py checks its error")
     shift = np.array([500_000.0, 5_000_000.0, 256.0])  # whole cells of the block map
@@ -124,24 +126,26 @@ def test_utm_coordinates_keep_their_digits(make: Callable[[Classes], SemanticMap
     np.testing.assert_allclose(there.probability, here.probability, atol=1e-4)
 
 
-def test_duplicate_points_do_no_harm(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_duplicate_points_do_no_harm(make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
     prediction = built(make, corner, corner, corner).query(corner.points)
     assert np.isfinite(prediction.probability).all()
 
 
-def test_a_single_class_is_a_map(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_a_single_class_is_a_map(make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
     floor = corner[corner.hard_labels == 0]
     assert (built(make, floor).query(floor.points).label == 0).all()
 
 
-def test_positions_say_where_the_data_are(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_positions_say_where_the_data_are(
+    make: Callable[[Classes], SerialisableMap], corner: LabelledCloud
+) -> None:
     positions = built(make, corner).positions
     nearest = np.linalg.norm(positions[:, None] - corner.points[None], axis=2).min(axis=1)
     assert len(positions) > 0
     assert nearest.max() < 0.5
 
 
-def test_info_is_ready_for_json(make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+def test_info_is_ready_for_json(make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
     import json
 
     semantic_map = built(make, corner)
@@ -153,7 +157,7 @@ def test_info_is_ready_for_json(make: Callable[[Classes], SemanticMap], corner: 
 
 class TestBadInput:
     def test_a_map_without_labels_says_so(
-        self, make: Callable[[Classes], SemanticMap], corner: LabelledCloud
+        self, make: Callable[[Classes], SerialisableMap], corner: LabelledCloud
     ) -> None:
         unlabelled = replace(corner, labels=np.full(len(corner), MISSING))
         for semantic_map in (make(corner.classes), built(make, corner[:0])):
@@ -165,7 +169,7 @@ class TestBadInput:
             with pytest.raises(InputError, match="no label"):
                 built(make, unlabelled).query(corner.points)
 
-    def test_other_classes(self, make: Callable[[Classes], SemanticMap], corner: LabelledCloud) -> None:
+    def test_other_classes(self, make: Callable[[Classes], SerialisableMap], corner: LabelledCloud) -> None:
         with pytest.raises(InputError, match="classes"):
             make(Classes(("road", "car"))).update(corner)
 
@@ -173,18 +177,18 @@ class TestBadInput:
         "bad", [np.full((2, 3), np.nan), np.full((2, 3), np.inf), np.zeros((3, 2)), np.zeros(3)]
     )
     def test_query_points(
-        self, make: Callable[[Classes], SemanticMap], corner: LabelledCloud, bad: np.ndarray
+        self, make: Callable[[Classes], SerialisableMap], corner: LabelledCloud, bad: np.ndarray
     ) -> None:
         with pytest.raises(InputError, match="query points"):
             built(make, corner).query(bad)
 
     def test_no_query_points_is_no_error(
-        self, make: Callable[[Classes], SemanticMap], corner: LabelledCloud
+        self, make: Callable[[Classes], SerialisableMap], corner: LabelledCloud
     ) -> None:
         assert len(built(make, corner).query(np.empty((0, 3)))) == 0
 
     def test_damaged_files_are_refused(
-        self, make: Callable[[Classes], SemanticMap], corner: LabelledCloud, tmp_path: Path
+        self, make: Callable[[Classes], SerialisableMap], corner: LabelledCloud, tmp_path: Path
     ) -> None:
         path = tmp_path / "map.semgp"
         semantic_map = built(make, corner)

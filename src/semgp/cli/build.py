@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -25,6 +26,7 @@ from semgp.maps.protocol import SerialisableMap
 from semgp.readers import Scans
 from semgp.store import BATCH, MapStore, Settings, StoredMap
 from semgp.store import build as build_stored
+from semgp.store.bucket import as_url
 
 Kind = Literal["gp", "octomap", "knn", "csm", "bki"]
 Workers = Annotated[Literal["threads", "ray"], Parameter(group="Many machines")]
@@ -70,9 +72,9 @@ def build(
     scans
         Point files, RGB-D recordings, robot logs or data-set folders; labels of -1 are missing.
     out
-        The map to write. A name that ends in .semgp is one file, written at the end. Any other is a store: a
-        folder, or a URL such as s3://bucket/drive, with a version every few scans; what has been published stays
-        whatever happens, and the map may be larger than memory.
+        The map to write. A name that ends in .semgp is one file, written at the end. Any other is a store, which
+        may be larger than memory: a folder, or a URL such as s3://bucket/drive. On the way it has a version every
+        few scans, which stay whatever happens; in a folder, the last one then replaces them.
     kind
         The method: the Gaussian-process map, the semantic OctoMap, or a baseline.
     model
@@ -126,6 +128,7 @@ def build(
                 "was interrupted."
             )
         _update_store(out, clouds, executor, workers, address, resume=True)
+        _drop_steps(out)
         return
     free = FreeSpace() if free_space or half_life is not None else None
     forgetting = None if half_life is None else Forgetting(half_life)
@@ -145,10 +148,11 @@ def build(
             semantic_map = GPSemanticMap(clouds[0].classes, blocks, free=free, forgetting=forgetting)
         if one_file:
             _fill(semantic_map, clouds, bars)
-    tell_dropped(clouds)
     if not one_file:
         _update_store(out, clouds, executor, workers, address)
+        _drop_steps(out)
         return
+    tell_dropped(clouds)
     save_map(semantic_map, out)
     n = len(semantic_map)
     report(f"{out}: {kind} map of {n:,} elements from {len(clouds)} scans", out=out, kind=kind, elements=n)
@@ -238,6 +242,7 @@ def _update_store(
                 build_stored(store, left, work, steps=lambda n: bars.update(bar, advance=n))
         else:
             _update_in_order(store, left, bars)
+    tell_dropped(clouds)
     manifest = store.manifest()
     if not manifest.sites:
         raise InputError(f"no scan has a label: {place} holds an empty map.")
@@ -246,6 +251,13 @@ def _update_store(
         f"{len(manifest.tiles)} tiles, {manifest.n_bytes / 1e6:.1f} MB",
         out=place, version=manifest.number, sites=manifest.sites, scans=manifest.clouds, bytes=manifest.n_bytes,
     )  # fmt: skip
+
+
+def _drop_steps(out: Path) -> None:
+    """Remove the versions on the way to a finished map, where nobody else can be at work on it."""
+    if as_url(out) is None:
+        with suppress(InputError):
+            MapStore(out).prune(1)
 
 
 def _update_in_order(store: MapStore, clouds: Scans, bars: Progress) -> None:

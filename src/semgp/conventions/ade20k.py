@@ -1,4 +1,4 @@
-"""ADE20K (Zhou et al., 2017): the 150 classes of its scene parsing benchmark, and 32 that a small network knows."""
+"""ADE20K (Zhou et al., 2017): 150 classes of its scene parsing benchmark, and 32 that a small network knows."""
 
 from __future__ import annotations
 

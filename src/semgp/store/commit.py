@@ -74,7 +74,7 @@ def _merged_tiles(store: MapStore, base: Manifest, mine: Manifest, theirs: Manif
     tiles = {}
     for key in base.tiles.keys() | mine.tiles.keys() | theirs.tiles.keys():
         a, b, c = (manifest.tiles.get(key) for manifest in (base, mine, theirs))
-        chosen = c if b == a else b if c in (a, b) else _both(store, key, mine, a, b, c)
+        chosen = c if b == a else b if c == a else _both(store, key, mine, a, b, c)
         if chosen is not None:
             tiles[key] = chosen
     return tiles

@@ -28,7 +28,10 @@ VERSION = 1
 
 _FARTHEST = int(EXACT)
 _DIGEST = re.compile(r"[0-9a-f]{64}")
-_DAMAGE = (InputError, ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, RecursionError)
+_DAMAGE = (
+    *(InputError, ValueError, KeyError, TypeError, IndexError),
+    *(AttributeError, ArithmeticError, RecursionError),
+)
 
 
 class Tile(NamedTuple):
