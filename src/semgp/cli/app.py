@@ -23,7 +23,7 @@ app = App(
 app.meta.suppress_keyboard_interrupt = False  # `main` says what Ctrl-C leaves
 app.command("semgp.cli.demo:demo")
 app.command("semgp.cli.build:build")
-app.command("semgp.cli.build:update")
+app.command("semgp.cli.update:update")
 app.command("semgp.cli.learn:learn")
 app.command("semgp.cli.maps:query")
 app.command("semgp.cli.maps:evaluate")
