@@ -13,7 +13,7 @@ from semgp.blocks.accumulate import PLACE_UNIT
 from semgp.blocks.arrays import F64, I64, Bool
 from semgp.blocks.cells import CELL, CELL_BITS, cell_keys
 from semgp.blocks.layout import around_keys
-from semgp.blocks.stored import stored_sites
+from semgp.blocks.stored import require_sites, require_times, stored_sites
 from semgp.errors import InputError
 from semgp.maps.blocks import ManyBlocks
 from semgp.voxels import AXIS_BITS, HALF_RANGE, STEP, voxel_indices, voxel_keys
@@ -142,12 +142,35 @@ def take_in(state: ManyBlocks, tiling: Tiling, tile: int, origin: I64, arrays: M
         Arrays that are damaged, or are not of this tile.
     """
     for prefix, field in state.fields.items():
-        known = dict(arrays) | {prefix + "origin": origin}
-        sites = stored_sites(known, prefix, field.sites.mass.shape[1], field.model.n_dims)
-        for name in ("voxels", "cells"):
-            if (tiling.keys(sites.get(name, np.empty(0, np.int64))) != tile).any():
-                raise InputError(f"the stored sites are damaged: some of the {name} lie in another tile.")
-        field.restore(sites)
+        field.restore(
+            tile_sites(arrays, prefix, tiling, tile, origin, field.sites.mass.shape[1], field.model.n_dims)
+        )
+
+
+def tile_sites(
+    arrays: Mapping[str, NDArray[Any]],
+    prefix: str,
+    tiling: Tiling,
+    tile: int,
+    origin: I64,
+    n_classes: int,
+    n_dims: int,
+) -> Arrays:
+    """Return the stored sites of one field of a tile, see `stored_sites`.
+
+    Raises
+    ------
+    InputError
+        Arrays that are damaged, or are not of this tile.
+    """
+    sites = stored_sites(dict(arrays) | {prefix + "origin": origin}, prefix, n_classes, n_dims)
+    for name in ("voxels", "cells"):
+        if (tiling.keys(sites.get(name, np.empty(0, np.int64))) != tile).any():
+            raise InputError(f"the stored sites are damaged: some of the {name} lie in another tile.")
+    require_sites(sites)
+    if "time" in sites:
+        require_times(sites["cells"], sites["time"])
+    return sites
 
 
 def tile_positions(arrays: Arrays, prefix: str, origin: I64, resolution: float) -> F64:

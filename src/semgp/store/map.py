@@ -157,7 +157,9 @@ class StoredMap(TiledMap):
         self._base, self._clouds = manifest, 0
 
     def close(self) -> None:
-        """Let go of the writers' lock. Updates that are not committed stay in memory."""
+        """Let go of the writers' lock, and forget updates that are not committed: some are in files of no version."""
+        if self._clouds or self._working.is_changed:
+            self._go_on_from(self._base)
         self._writing.close()
         self._is_writing = False
 
@@ -169,8 +171,6 @@ class StoredMap(TiledMap):
         try:
             if kind is None:
                 self.commit()
-            else:
-                self._go_on_from(self._base)
         finally:
             self.close()
 

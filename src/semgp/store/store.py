@@ -10,8 +10,10 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from semgp.errors import ConflictError, FileFormatError, InputError
-from semgp.maps.tiles import Arrays
+from semgp.maps.tiles import Arrays, tile_sites
 from semgp.parallel import parallel_map
 from semgp.store.bucket import open_files
 from semgp.store.files import Files
@@ -136,7 +138,11 @@ class MapStore:
             if hashlib.sha256(data).hexdigest() != tile.digest:
                 raise InputError("is damaged: its checksum is not the one in the manifest.")
             columns = {"": len(settings.classes) + settings.model.other}
-            arrays = decode(data, columns if settings.free is None else columns | {"free.": 2})
+            columns |= {} if settings.free is None else {"free.": 2}
+            arrays = decode(data, columns)
+            for prefix, n in columns.items():
+                dims = 3 if prefix else settings.model.n_dims
+                tile_sites(arrays, prefix, settings.tiling, key, np.zeros(3, np.int64), n, dims)
             counts = tuple(len(arrays.get(name, ())) for name in ("voxels", "free.voxels"))
             if counts != (tile.sites, tile.free_sites):
                 raise InputError(f"is damaged: it has {counts} sites, not {(tile.sites, tile.free_sites)}.")

@@ -97,6 +97,8 @@ def _unpacked(packed: Arrays, prefix: str, n_classes: int) -> Arrays:
     arrays = {name: a for name, a in packed.items() if _split(name)[0] == prefix}
     for name in (prefix + "voxels", prefix + "cells"):
         if name in arrays:
+            if arrays[name].dtype != np.int64 or arrays[name].ndim != 1:
+                raise InputError(f"is damaged: {name} of another type or shape.")
             arrays[name] = arrays[name].cumsum(dtype=np.int64)
     counts, labels = arrays.pop(prefix + "n_classes"), arrays.pop(prefix + "class")
     amounts = arrays[prefix + "mass"]
