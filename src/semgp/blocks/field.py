@@ -105,7 +105,10 @@ class Field:
         """Return the field of some of the cells, with their blocks as they are."""
         made = Field(self.model, self._n_classes)
         chosen = self.sites.cells.keys[cells]
-        made.sites.restore(self.sites.only(np.isin(cell_keys(self.sites.voxels.keys), chosen)))
+        arrays = self.sites.only(np.isin(cell_keys(self.sites.voxels.keys), chosen))
+        if "time" in arrays:
+            arrays |= {"cells": chosen, "time": np.append(arrays["time"][cells], arrays["time"][-1])}
+        made.sites.restore(arrays)
         made.sites.origin, made.sites.clock = self.sites.origin, self.sites.clock
         made.sites.cell_ids(chosen)
         old = self.sites.cells.find(made.sites.cells.keys)

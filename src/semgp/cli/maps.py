@@ -8,13 +8,17 @@ import numpy as np
 
 from semgp.cli.console import progress, report, score_table
 from semgp.cli.inputs import PLAIN, AnyInputs, in_classes, sources, tell_dropped
+from semgp.cli.update import Address, Count, Workers
 from semgp.errors import InputError
 from semgp.evaluation.scores import score
+from semgp.executors import open_executor
 from semgp.maps.batches import query_in_batches
 from semgp.maps.files import load_map
 from semgp.maps.points import point_writer, write_prediction
 from semgp.maps.surface import surface_grid
 from semgp.readers import open_scans
+from semgp.store import StoredMap
+from semgp.store.asking import query as query_stored
 
 SCORES = ("points", "coverage", "auc", "accuracy", "miou", "nll", "brier", "ece")
 
@@ -26,6 +30,9 @@ def query(
     out: Path,
     points: Path | None = None,
     resolution: float | None = None,
+    executor: Workers = "threads",
+    workers: Count = None,
+    address: Address = None,
 ) -> None:
     """Ask a map for class probabilities and uncertainty, and write them as points.
 
@@ -42,18 +49,31 @@ def query(
         A point file: the query points.
     resolution
         Instead of points, the spacing in metres of a grid along the mapped surface.
+    executor
+        Who asks a store: the threads of this process, or a Ray cluster.
+    workers
+        How many at a time; one for each core by default.
+    address
+        Address of a Ray cluster, "auto" for the one this machine belongs to; left out, one is started here.
     """
     if (points is None) == (resolution is None):
         raise InputError("give either --points FILE or --resolution METRES.")
     point_writer(out)
     semantic_map = load_map(map_file)
+    many = executor != "threads" or workers is not None or address is not None
+    if many and not isinstance(semantic_map, StoredMap):
+        raise InputError("--executor, --workers and --address are for stores, and this map is one file.")
     if points is not None:
         X = np.concatenate([cloud.points for cloud in open_scans(points)])
     else:
         X = surface_grid(semantic_map.positions, resolution)
     with progress() as bars:
-        asking = bars.add_task("asking the map", total=len(X))
-        prediction = query_in_batches(semantic_map, X, lambda n, _: bars.update(asking, completed=n))
+        asking = bars.add_task("asking the map", total=None if many else len(X))
+        if many and isinstance(semantic_map, StoredMap):
+            with open_executor(executor, workers, address) as work:
+                prediction = query_stored(semantic_map.store, X, work, version=semantic_map.version)
+        else:
+            prediction = query_in_batches(semantic_map, X, lambda n, _: bars.update(asking, completed=n))
     write_prediction(out, X, prediction)
     seen = np.count_nonzero(prediction.observed)
     report(f"{out}: {len(X):,} points, {seen:,} of them observed", out=out, points=len(X), observed=seen)

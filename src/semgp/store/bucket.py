@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -79,19 +78,27 @@ class BucketFiles:
     def age(self, name: str) -> float:
         """Return the seconds since a file was created."""
         import obstore
+        from obstore import exceptions
 
         try:
             created = obstore.head(self._bucket, name)["last_modified"]
         except FileNotFoundError:
             return 0.0
+        except (OSError, exceptions.BaseError) as error:
+            raise FileFormatError(f"{self.location}/{name}", f"cannot be read: {_short(error)}.") from error
         return max(0.0, (datetime.now(UTC) - created).total_seconds())
 
     def remove(self, name: str) -> None:
         """Remove a file where it is there."""
         import obstore
+        from obstore import exceptions
 
-        with suppress(FileNotFoundError):
+        try:
             obstore.delete(self._bucket, name)
+        except FileNotFoundError:
+            return
+        except (OSError, exceptions.BaseError) as error:
+            raise InputError(f"cannot remove {self.location}/{name}: {_short(error)}.") from error
 
     def remove_partial(self) -> int:
         """Do nothing: a put is whole or not there."""

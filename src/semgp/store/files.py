@@ -169,16 +169,21 @@ class LocalFiles:
             return max(0.0, time.time() - (self.folder / name).stat().st_mtime)
         except FileNotFoundError:
             return 0.0
+        except OSError as error:
+            raise FileFormatError(self.folder / name, f"cannot be read: {error.strerror or error}.") from error
 
     def remove(self, name: str) -> None:
         """Remove a file where it is there."""
-        (self.folder / name).unlink(missing_ok=True)
+        try:
+            (self.folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot remove {self.folder / name}: {error.strerror or error}.") from error
 
     def remove_partial(self) -> int:
         """Remove half-written files; only for a writer that is alone."""
         partial = [path for path in self.folder.glob(f"*/{_PARTIAL}*") if path.is_file()]
         for path in partial:
-            path.unlink(missing_ok=True)
+            self.remove(f"{path.parent.name}/{path.name}")
         return len(partial)
 
     def lock(self) -> WritersLock:

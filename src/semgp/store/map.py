@@ -103,8 +103,8 @@ class StoredMap(TiledMap):
         self._working.hold(self._touched(cloud))
         self._working.state.add(cloud)
         self._working.mark()
-        self._working.make_room()
         self._clouds += 1
+        self._working.make_room()
 
     def _touched(self, cloud: LabelledCloud) -> I64:
         """The tiles that a cloud may change; rays stay within the box round their ends."""
@@ -157,7 +157,10 @@ class StoredMap(TiledMap):
         self._base, self._clouds = manifest, 0
 
     def close(self) -> None:
-        """Let go of the writers' lock, and forget updates that are not committed: some are in files of no version."""
+        """Let go of the writers' lock, and forget updates that are not committed.
+
+        Some of them may be in files of no version, which the next writer removes.
+        """
         if self._clouds or self._working.is_changed:
             self._go_on_from(self._base)
         self._writing.close()

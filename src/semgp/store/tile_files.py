@@ -32,6 +32,7 @@ from semgp.readers.npz import DAMAGE, read_member, read_npy
 Arrays = dict[str, NDArray[Any]]
 
 _LEVEL = 1  # of compression: the sixth takes four times as long and saves a tenth
+_MOST_MASSES = 1 << 30  # 4 GiB
 _SLACK, _RATIO = 1 << 26, 100  # bytes that any file may unpack to, and beyond that how many a byte
 
 
@@ -107,6 +108,8 @@ def _unpacked(packed: Arrays, prefix: str, n_classes: int) -> Arrays:
     sites = arrays[prefix + "voxels"].shape
     if counts.shape != sites or not counts.all():
         raise InputError("is damaged: sites without masses.")
+    if len(counts) * n_classes > _MOST_MASSES:
+        raise InputError(f"is damaged: {len(counts):,} sites of {n_classes:,} classes are too many for a tile.")
     if not (len(labels) == len(amounts) == counts.sum()) or (labels >= n_classes).any():
         raise InputError("is damaged: masses that do not belong to its sites, or classes that the map has not.")
     mass = np.zeros((len(counts), n_classes), dtype=np.uint32)

@@ -160,9 +160,11 @@ class WorkingSet:
         self._drop(differ)
         self._changed.clear()
         self.tiles, self.sizes = dict(tiles), _sizes(tiles)
-        if origin is None:
+        before = self.state.clock
+        if origin is None or (before is not None and (clock is None or clock < before)):  # back in time
             self.state = self.settings.new_state()
-        else:
+            self._held.clear()
+        if origin is not None:
             self.state.begin(origin, clock)
 
 
