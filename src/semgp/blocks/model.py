@@ -31,6 +31,7 @@ EXPERTS = ("dirichlet", "laplace", "ep", "softmax")
 """Posteriors that each block solves by itself, class by class: slower, for comparison."""
 
 _POSITIVE = ("resolution", "s_n", "nugget", "a", "delta", "v_0")
+_FINEST, _COARSEST = 1e-6, 1e6  # metres
 _MOST_MEMBERS = 1024  # a block's covariance is a dense matrix
 
 
@@ -110,6 +111,8 @@ class BlockModel:
             if not (isinstance(value, int | float | np.number) and math.isfinite(value) and value > 0):
                 raise InputError(f"{name} must be a number, positive and finite, not {value!r}.")
             object.__setattr__(self, name, float(value))
+        if not _FINEST <= self.resolution <= _COARSEST:
+            raise InputError(f"resolution must lie from {_FINEST:g} to {_COARSEST:g} m, not {self.resolution}.")
         weights = CLOSED.get(self.posterior, (0.0, 0.0, 1.0)) if self.weights is None else self.weights
         powers = tuple(float(w) for w in weights)
         if len(powers) != 3 or not all(math.isfinite(w) and w >= 0 for w in powers) or sum(powers) <= 0:

@@ -13,7 +13,7 @@ from semgp.blocks.model import BlockModel
 from semgp.cli.console import progress, report
 from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources, tell_dropped
 from semgp.cli.learn import PAPER, SAMPLE, Axis, block_model, learn_blocks, learn_paper
-from semgp.cli.update import Address, Count, Workers, fill, update_store
+from semgp.cli.update import BUILDING, Address, Count, Workers, fill, update_store
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
 from semgp.maps.files import is_file_name, save_map
@@ -123,8 +123,10 @@ def build(
                 f"{out} holds a map already: `semgp update` adds scans to it, --resume goes on with a build that "
                 "was interrupted."
             )
-        update_store(out, clouds, executor, workers, address, resume=True)
-        _drop_steps(out)
+        manifest = MapStore(out).manifest()
+        if manifest.note != BUILDING:
+            raise InputError(f"{out} has been changed since it was built: add scans to it with `semgp update`.")
+        update_store(out, clouds, executor, workers, address, done=manifest.clouds)
         return
     free = FreeSpace() if free_space or half_life is not None else None
     forgetting = None if half_life is None else Forgetting(half_life)
@@ -140,12 +142,12 @@ def build(
         else:
             blocks = _blocks(clouds, model, resolution, vertical, learn, seed, bars)
             if not one_file:
-                MapStore(out).create(Settings(clouds[0].classes, blocks, free, forgetting), "begun")
+                MapStore(out).create(Settings(clouds[0].classes, blocks, free, forgetting), BUILDING)
             semantic_map = GPSemanticMap(clouds[0].classes, blocks, free=free, forgetting=forgetting)
         if one_file:
             fill(semantic_map, clouds, bars)
     if not one_file:
-        update_store(out, clouds, executor, workers, address)
+        update_store(out, clouds, executor, workers, address, done=0)
         _drop_steps(out)
         return
     tell_dropped(clouds)

@@ -23,6 +23,9 @@ Workers = Annotated[Literal["threads", "ray"], Parameter(group="Many machines")]
 Address = Annotated[str | None, Parameter(group="Many machines")]
 Count = Annotated[int | None, Parameter(group="Many machines")]
 
+BUILDING = "build"
+"""The note of versions that a build makes, on the way and at its end."""
+
 
 def update(
     map_place: Path,
@@ -79,24 +82,31 @@ def fill(semantic_map: SerialisableMap, clouds: Scans, bars: Progress) -> None:
 
 
 def update_store(
-    place: Path, clouds: Scans, executor: str, workers: int | None, address: str | None, *, resume: bool = False
+    place: Path, clouds: Scans, executor: str, workers: int | None, address: str | None, *, done: int | None = None
 ) -> None:
-    """Add clouds to a store, a version every few of them, and say what came of it."""
+    """Add clouds to a store, a version every few of them, and say what came of it.
+
+    For a build, `done` is how many of them it holds already; None for an update.
+    """
     store = MapStore(place)
-    done = store.manifest().clouds if resume else 0
-    left = clouds[done:]
+    begun = store.manifest()
+    left, note = clouds[done or 0 :], "" if done is None else BUILDING
 
     def kept() -> str:
         manifest = store.manifest()
-        return f"{place} holds version {manifest.number} with {manifest.clouds} scans; --resume goes on from there"
+        words = f"{place} holds version {manifest.number} with {manifest.clouds} scans"
+        if done is not None:
+            return f"{words}; --resume goes on from there"
+        new = manifest.clouds - begun.clouds
+        return f"{words}, {new} of them new" + (f"; --first {left.indices[new]} goes on from there" if new else "")
 
     with keeping(kept), progress() as bars:
-        bar = bars.add_task("building the map", total=len(clouds), completed=done)
-        if store.manifest().settings.forgetting is None:
+        bar = bars.add_task("building the map", total=len(clouds), completed=done or 0)
+        if begun.settings.forgetting is None:
             with open_executor(executor, workers, address) as work:
-                build_stored(store, left, work, steps=lambda n: bars.update(bar, advance=n))
+                build_stored(store, left, work, note=note, steps=lambda n: bars.update(bar, advance=n))
         else:
-            _update_in_order(store, left, bars)
+            _update_in_order(store, left, note, bars)
     tell_dropped(clouds)
     manifest = store.manifest()
     if not manifest.sites:
@@ -108,10 +118,10 @@ def update_store(
     )  # fmt: skip
 
 
-def _update_in_order(store: MapStore, clouds: Scans, bars: Progress) -> None:
+def _update_in_order(store: MapStore, clouds: Scans, note: str, bars: Progress) -> None:
     """Add clouds one after the other, to a map that forgets."""
     with StoredMap(store) as stored:
         for i, cloud in enumerate(bars.track(clouds, description="building the map"), 1):
             stored.update(cloud)
-            if i % BATCH == 0:
-                stored.commit()
+            if i % BATCH == 0 or i == len(clouds):
+                stored.commit(note)

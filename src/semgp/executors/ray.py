@@ -121,7 +121,11 @@ class RayExecutor:
         return self._gather(combined, no_steps)
 
     def _gather(self, references: list[Any], steps: Steps) -> list[Any]:
-        """Return results in their order; after an error, or Ctrl-C, nothing more is begun."""
+        """Return results in their order.
+
+        After an error the other tasks are left to end by themselves, or with the cluster: where one ends while it
+        is being cancelled, Ray (2.60) aborts this process.
+        """
         results: list[Any] = []
         try:
             for reference in references:
@@ -132,9 +136,6 @@ class RayExecutor:
             raise cause from (None if isinstance(cause, SemgpError) else error)
         except self._ray.exceptions.RayError as error:
             raise ExecutorError(f"the workers have failed {_RETRIES} times: {_first_line(error)}") from error
-        finally:
-            for reference in references[len(results) :]:
-                self._ray.cancel(reference)
         return results
 
     def close(self) -> None:

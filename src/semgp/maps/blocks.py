@@ -142,7 +142,7 @@ class ManyBlocks:
             self._put(prefix, field.only(np.flatnonzero(keep(field.sites.cells.keys)).astype(np.int32)))
 
     def begin(self, origin: I64, clock: float | None) -> None:
-        """Set where the keys of a map begin, and its time, which may be earlier than that of cells without sites."""
+        """Set where the keys of a map begin, and its time; it may be earlier than that of cells without sites."""
         for field in self.fields.values():
             field.sites.origin, field.sites.clock = origin, clock
             if clock is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from semgp.errors import FileFormatError, InputError, MissingExtraError
-from semgp.store.files import Files, LocalFiles, WritersLock
+from semgp.store.files import MOST_BYTES, Files, LocalFiles, WritersLock
 
 if TYPE_CHECKING:
     from obstore.store import ObjectStore
@@ -39,13 +39,17 @@ class BucketFiles:
         """The bucket's URL."""
         return self._location
 
-    def read(self, name: str) -> bytes:
-        """Return what a file holds."""
+    def read(self, name: str, most: int = MOST_BYTES) -> bytes:
+        """Return what a file of so many bytes at most holds."""
         import obstore
         from obstore import exceptions
 
         try:
-            return bytes(obstore.get(self._bucket, name).bytes())
+            found = obstore.get(self._bucket, name)
+            if found.meta["size"] > most:
+                problem = f"is damaged: it has more than the {most:,} bytes that it should have."
+                raise FileFormatError(f"{self.location}/{name}", problem)
+            return bytes(found.bytes())
         except FileNotFoundError as error:
             raise FileFormatError(f"{self.location}/{name}", "no such file.") from error
         except (OSError, exceptions.BaseError) as error:
@@ -118,8 +122,8 @@ def open_files(location: str | Path) -> Files:
         A URL that names no bucket, or settings that are missing; MissingExtraError without `obstore`.
     """
     url = as_url(location)
-    if url is None:
-        return LocalFiles(Path(location))
+    if url is None or url.startswith("file:"):
+        return LocalFiles(Path(location if url is None else url.removeprefix("file://")))
     try:
         from obstore import exceptions
         from obstore.store import from_url
@@ -139,4 +143,6 @@ def _short(error: Exception) -> str:
 def as_url(location: str | Path) -> str | None:
     """Return a location as a URL, whole again where it has been a path for a while; None for a path."""
     match = _URL.fullmatch(str(location))
-    return None if match is None else f"{match[1]}://{match[2]}"
+    if match is None:
+        return None
+    return f"{match[1]}://{'/' if match[1] == 'file' else ''}{match[2]}"

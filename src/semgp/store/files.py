@@ -19,6 +19,10 @@ _PARTIAL = ".partial-"
 _LOCK = "writers.lock"
 
 
+MOST_BYTES = 1 << 30
+"""Bytes of any file of a store; a manifest of ten million tiles."""
+
+
 class WritersLock:
     """A lock that writers share, which the system lets go of when a process dies.
 
@@ -66,13 +70,13 @@ class Files(Protocol):
         """The folder's path or the bucket's URL, for error messages."""
         ...
 
-    def read(self, name: str) -> bytes:
-        """Return what a file holds.
+    def read(self, name: str, most: int = MOST_BYTES) -> bytes:
+        """Return what a file of so many bytes at most holds.
 
         Raises
         ------
         FileFormatError
-            No such file, or one that cannot be read.
+            No such file, or one that is larger or cannot be read.
         """
         ...
 
@@ -118,19 +122,21 @@ class LocalFiles:
         """The folder's path."""
         return str(self.folder)
 
-    def read(self, name: str) -> bytes:
-        """Return what a file holds."""
+    def read(self, name: str, most: int = MOST_BYTES) -> bytes:
+        """Return what a file of so many bytes at most holds."""
         path = self.folder / name
         try:
             if path.exists() and not path.is_file():
                 raise FileFormatError(path, "cannot be read: it is no file.")
-            return path.read_bytes()
-        except MemoryError as error:
-            raise FileFormatError(path, "cannot be read: it is larger than memory.") from error
+            with path.open("rb") as file:
+                data = file.read(most + 1)
         except FileNotFoundError as error:
             raise FileFormatError(path, "no such file.") from error
         except OSError as error:
             raise FileFormatError(path, f"cannot be read: {error.strerror or error}.") from error
+        if len(data) > most:
+            raise FileFormatError(path, f"is damaged: it has more than the {most:,} bytes that it should have.")
+        return data
 
     def create(self, name: str, data: bytes) -> bool:
         """Create a file by linking a finished one to its name: that fails where the name is taken."""

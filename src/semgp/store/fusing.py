@@ -47,7 +47,7 @@ def fuse_stored(
     settings = _fused(a.settings, b.settings)
     store = out if isinstance(out, MapStore) else MapStore(out)
     with store.writing():
-        first = store.create(settings, note)
+        store.require_empty()
         keep = tuple(settings.new_state().fields)
         tiles = {key: store.put(key, _only(arrays, keep)) for key, arrays in a.parts()}
         origin = a.origin
@@ -62,7 +62,7 @@ def fuse_stored(
                 field.restore(joined([sums[prefix]], origin))
             _add(store, settings, tiles, cut(state, settings.tiling, every_tile(state, settings.tiling)))
         clouds = a.clouds + b.clouds
-        fused = store.publish(replace(first, origin=voxel(origin), tiles=tiles, clouds=clouds), note)
+        fused = store.publish(Manifest(0, settings, "", origin=voxel(origin), tiles=tiles, clouds=clouds), note)
     store.tidy()  # what tiles were before all of b had been added
     return fused
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from semgp.errors import InputError
@@ -39,8 +38,10 @@ def save(semantic_map: GPSemanticMap, store: MapStore | str | Path, *, cells: in
     store = store if isinstance(store, MapStore) else MapStore(store)
     settings = Settings(semantic_map.classes, state.model, state.free, state.forgetting, Tiling(cells))
     with store.writing():
-        first = store.create(settings, note)
+        store.require_empty()
         keys = every_tile(state, settings.tiling)
         parts = cut(state, settings.tiling, keys)
         tiles = dict(zip(parts, parallel_map(lambda tile: store.put(tile, parts[tile]), parts)))
-        return store.publish(replace(first, origin=voxel(state.origin), clock=state.clock, tiles=tiles), note)
+        return store.publish(
+            Manifest(0, settings, "", origin=voxel(state.origin), clock=state.clock, tiles=tiles), note
+        )

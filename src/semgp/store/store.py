@@ -61,9 +61,13 @@ class MapStore:
         InputError
             There is a map already.
         """
+        self.require_empty()
+        return self.publish(Manifest(0, settings, ""), note)
+
+    def require_empty(self) -> None:
+        """Raise InputError where there is a map already."""
         if self.numbers():
             raise InputError(f"{self.location} holds a map already: update it, or choose another place.")
-        return self.publish(Manifest(0, settings, ""), note)
 
     def numbers(self) -> list[int]:
         """Return the numbers of the versions, ascending."""
@@ -133,7 +137,7 @@ class MapStore:
             A file that is missing or damaged.
         """
         name = f"tiles/{tile.name(key)}"
-        data = self.files.read(name)
+        data = self.files.read(name, tile.n_bytes)
         try:
             if hashlib.sha256(data).hexdigest() != tile.digest:
                 raise InputError("is damaged: its checksum is not the one in the manifest.")
