@@ -65,6 +65,11 @@ class WriteTiles:
 
     def __call__(self, parts: list[Part]) -> dict[int, Tile]:
         """Write the tiles of the parts, and return their files."""
+        if self.manifest.number not in self.store.numbers():
+            raise InputError(
+                f"{self.store.location}: a worker does not see version {self.manifest.number}. All machines must "
+                "reach the store by the same path or URL."
+            )
         settings, written = self.manifest.settings, {}
         for tile in sorted({tile for part in parts for tile in part}):
             old = self.manifest.tiles.get(tile)
