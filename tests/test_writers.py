@@ -15,7 +15,7 @@ from semgp.errors import InputError, MissingExtraError
 from semgp.maps.points import POINT_WRITERS, write_prediction
 from semgp.prediction import OccupancyPrediction, Prediction
 from semgp.readers import read
-from semgp.writers import atomic_write, write_las, write_pcd
+from semgp.writers import atomic_write, write_csv, write_las, write_pcd
 
 CLASSES = Classes(("floor mat", "wall", "überall"), ((1, 2, 3), (4, 5, 6), (250, 251, 252)))
 POINTS = np.array([[0.5, 1.5, -2.5], [1, 2, 3], [-4, 5, 6.25]])
@@ -149,7 +149,7 @@ def test_write_las_refuses_and_leaves_nothing(options: dict[str, Any], message: 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("suffix", POINT_WRITERS)
+@pytest.mark.parametrize("suffix", sorted(POINT_WRITERS.keys() - {".csv"}))
 def test_a_prediction_in_every_format(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{suffix}"
     write_prediction(path, UTM, prediction())
@@ -223,3 +223,29 @@ def test_atomic_write_keeps_the_old_file_after_an_error(tmp_path: Path) -> None:
 def test_atomic_write_into_no_folder(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"), atomic_write(tmp_path / "no" / "a.ply"):
         pass
+
+
+def test_csv_is_read_again(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    points, classes = rng.normal(size=(40, 3)) * 1e5, Classes(("low wall", "sky, clear"))
+    p = rng.dirichlet(np.ones(2), 40)
+    colours = rng.integers(0, 255, (40, 3)).astype(np.uint8)
+    label = p.argmax(axis=1)
+    write_csv(
+        tmp_path / "a.csv", points, classes=classes, colours=colours, probability=p, label=label, entropy=p[:, 0]
+    )
+    header, *rows = (tmp_path / "a.csv").read_text().splitlines()
+    assert header == "x,y,z,red,green,blue,p_low_wall,p_sky__clear,label,entropy"
+    table = np.array([[float(v) for v in row.split(",")] for row in rows])
+    np.testing.assert_allclose(table[:, :3], points, atol=5.1e-5)
+    np.testing.assert_allclose(table[:, 6:8], p, rtol=1e-5)
+    np.testing.assert_array_equal(table[:, 8], label)
+    np.testing.assert_array_equal(read(tmp_path / "a.csv").hard_labels, label)
+
+
+def test_csv_refuses_what_no_writer_takes(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="finite"):
+        write_csv(tmp_path / "a.csv", [[0, 0, np.nan]])
+    with pytest.raises(InputError, match="needs classes"):
+        write_csv(tmp_path / "a.csv", [[0, 0, 0]], probability=[[1.0]])
+    assert not (tmp_path / "a.csv").exists()

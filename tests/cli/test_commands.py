@@ -103,9 +103,7 @@ class TestBadInput:
         out = built.with_name("out.ply")
         self.fails(capsys, "either --points FILE or --resolution", "query", built, "--out", out)
         self.fails(capsys, "positive number of metres", "query", built, "--resolution", "-1", "--out", out)
-        self.fails(
-            capsys, ".ply, .npz", "query", built, "--resolution", "1", "--out", built.with_name("out.doc")
-        )
+        self.fails(capsys, ".ply, .npz", "query", built, "--resolution", "1", "--out", built.with_name("out.doc"))
         self.fails(capsys, "folder", "query", built, "--resolution", "1", "--out", built.parent / "no" / "out.ply")
         self.fails(capsys, "Unknown option", "build", scan, "--out", out, "--flavour", "blue")
         self.fails(capsys, "classes", "evaluate", built, "--truth", self.other_classes(built))
@@ -201,3 +199,12 @@ class TestBlockModels:
         model = scans[0].with_name("model.json")
         TestBadInput().fails(capsys, "two with labels at least", "learn", scans[0], "--out", model)
         assert not model.exists()
+
+
+def test_finer_than_the_map(built: Path, tmp_path: Path) -> None:
+    numbers = []
+    for resolution in ("0.1", "0.02"):
+        out = tmp_path / f"at-{resolution}.ply"
+        assert run("query", built, "--resolution", resolution, "--out", out, "--quiet") == 0
+        numbers.append(len(read(out)))
+    assert numbers[1] > 6 * numbers[0]

@@ -121,7 +121,7 @@ def test_utm_gets_an_origin_of_its_own(maps: Path) -> None:
         ("build it with semgp build --free-space", ("plain.semgp", "--out", "{out}.bt")),
         ("has no resolution of its own: give --resolution", ("knn.semgp", "--out", "{out}.ply")),
         ("is written as it is", ("octomap.semgp", "--resolution", "0.5", "--out", "{out}.bt")),
-        ("written as .ply, .npz, .pcd, .las, .laz, .bt, .ot", ("gp.semgp", "--out", "{out}.doc")),
+        ("written as .ply, .npz, .pcd, .las, .laz, .csv, .bt, .ot", ("gp.semgp", "--out", "{out}.doc")),
         ("positive number of metres", ("gp.semgp", "--resolution", "0", "--out", "{out}.ply")),
         ("positive", ("gp.semgp", "--resolution", "-1", "--out", "{out}.bt")),
         ("reach of a tree", ("gp.semgp", "--resolution", "0.00001", "--out", "{out}.bt")),

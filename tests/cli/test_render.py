@@ -105,7 +105,7 @@ def test_the_surface_of_one_class(suffix: str, built: Path, tmp_path: Path) -> N
         ("positive number of metres", ("render", "{built}", "--resolution", "0", "--out", "{out}.png")),
         ("two frames", ("render", "{built}", "--orbit", "--frames", "1", "--out", "{out}.gif")),
         ("pictures a second", ("render", "{built}", "--orbit", "--rate", "99", "--out", "{out}.gif")),
-        ("at least one pixel", ("render", "{built}", "--size", "0", "9", "--out", "{out}.png")),
+        ("16 to 16,384 pixels", ("render", "{built}", "--size", "0", "9", "--out", "{out}.png")),
         ("--heights FROM TO", ("slice", "{built}", "--height", "1", "--out", "{out}.yaml")),
         ("one --height", ("slice", "{built}", "--heights", "0", "1", "--out", "{out}.png")),
         (".ply or .glb", ("surface", "{built}", "--resolution", "0.1", "--out", "{out}.obj")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,9 +11,9 @@ from cyclopts import Parameter
 from rich.progress import Progress
 
 from semgp.blocks.model import BlockModel
-from semgp.cli.console import progress, report
-from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources, tell_dropped
-from semgp.cli.learn import PAPER, SAMPLE, Axis, block_model, learn_blocks, learn_paper
+from semgp.cli.console import counted, progress, report
+from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources, tell_labels
+from semgp.cli.learn import LEAST_OVERLAP, PAPER, SAMPLE, Axis, block_model, learn_blocks, learn_paper, overlap
 from semgp.cli.update import BUILDING, Address, Count, Workers, fill, update_store
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
@@ -150,10 +151,12 @@ def build(
         update_store(out, clouds, executor, workers, address, done=0)
         _drop_steps(out)
         return
-    tell_dropped(clouds)
+    tell_labels(clouds)
     save_map(semantic_map, out)
     n = len(semantic_map)
-    report(f"{out}: {kind} map of {n:,} elements from {len(clouds)} scans", out=out, kind=kind, elements=n)
+    report(
+        f"{out}: {kind} map of {n:,} elements from {counted(len(clouds), 'scan')}", out=out, kind=kind, elements=n
+    )
 
 
 def _blocks(
@@ -164,7 +167,16 @@ def _blocks(
     if not learn or model not in PRESETS:
         return blocks
     labelled = [cloud for cloud in at_most(clouds, *SAMPLE) if cloud.labelled.any()]
-    return learn_blocks(labelled, blocks, vertical, seed, bars) if len(labelled) > 1 else blocks
+    if len(labelled) < 2:
+        return blocks
+    if (shared := overlap(labelled, blocks.resolution)) < LEAST_OVERLAP:
+        warnings.warn(
+            f"the scans see different places (one half of them {shared:.0%} of what the other sees), so that "
+            f"nothing can be learned from them: the model is {model} as it is.",
+            stacklevel=2,
+        )
+        return blocks
+    return learn_blocks(labelled, blocks, vertical, seed, bars)
 
 
 def _drop_steps(out: Path) -> None:

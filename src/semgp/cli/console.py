@@ -97,6 +97,11 @@ class _Pace(ProgressColumn):
         return Text(words, style="progress.remaining")
 
 
+def counted(n: int, what: str) -> str:
+    """Return a number of things in words: 1 scan, 1,200 scans."""
+    return f"{n:,} {what}" + ("" if n == 1 else "es" if what.endswith("s") else "s")
+
+
 @contextmanager
 def keeping(say: Callable[[], str]) -> Iterator[None]:
     """Tell, after Ctrl-C in the block, what it leaves behind: `say` is asked for it then."""

@@ -15,7 +15,7 @@ from semgp.maps.grid import write_grid
 from semgp.maps.octree import to_octomap
 from semgp.maps.points import POINT_WRITERS, point_writer, write_prediction
 from semgp.maps.protocol import SemanticMap
-from semgp.maps.surface import surface_grid
+from semgp.maps.surface import surface_of
 from semgp.octomap import SemanticOctoMap
 
 OCTOMAP_SUFFIXES = (".bt", ".ot")
@@ -36,8 +36,8 @@ def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> 
     map_file
         A map that `semgp build` wrote.
     out
-        The file to write. Points: .ply, .pcd, .las, .laz or .npz, as `semgp query` writes them. OctoMap: .bt, free
-        or occupied, or .ot, with log-odds and the class colours; for a map with free space (semgp build
+        The file to write. Points: .ply, .pcd, .las, .laz, .csv or .npz, as `semgp query` writes them. OctoMap:
+        .bt, free or occupied, or .ot, with log-odds and the class colours; for a map with free space (semgp build
         --free-space) or an OctoMap. Bags: .mcap or .db3 for ROS 2, .bag for ROS 1, with /semantic_map
         (PointCloud2) and, from maps with free space, /octomap (octomap_msgs). Grids: .zarr, a folder of dense
         arrays of labels, probabilities, variance and, where there is, occupancy.
@@ -62,7 +62,7 @@ def _export_points(map_file: Path, out: Path, resolution: float | None) -> None:
     semantic_map = load_map(map_file)
     if resolution is None:
         resolution = _resolution(map_file, semantic_map)
-    X = surface_grid(semantic_map.positions, resolution)
+    X = surface_of(semantic_map, resolution)
     with progress() as bars:
         asking = bars.add_task("asking the map", total=len(X))
         prediction = query_in_batches(semantic_map, X, lambda n, _: bars.update(asking, completed=n))
@@ -73,7 +73,7 @@ def _export_points(map_file: Path, out: Path, resolution: float | None) -> None:
 def _export_bag(map_file: Path, out: Path, resolution: float | None) -> None:
     semantic_map = load_map(map_file)
     edge = _resolution(map_file, semantic_map) if resolution is None else resolution
-    X = surface_grid(semantic_map.positions, edge)
+    X = surface_of(semantic_map, edge)
     with progress() as bars:
         bars.add_task(f"querying {len(X):,} points", total=None)
         octomap = semantic_map if isinstance(semantic_map, SemanticOctoMap) else None

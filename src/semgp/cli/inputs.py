@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
-from semgp.class_files import ClassFile, class_list, remapping
-from semgp.classes import Classes
-from semgp.cli.console import MANNERS, STDERR
-from semgp.cloud import LabelledCloud
+from semgp.class_files import class_list, remapping
+from semgp.cli.console import MANNERS, STDERR, counted
+from semgp.cli.reading import Reading
 from semgp.errors import InputError
 from semgp.logs.scans import LogScans
 from semgp.readers import Scans, open_scans
-from semgp.remapping import remapped, without_counterpart
 from semgp.segmentation import labelled_scans, segmenter_of
 
 
@@ -31,8 +26,8 @@ class Inputs:
     ----------
     classes
         What the labels in the files mean: a class file (.toml, .csv, SemanticKITTI .yaml), a built-in list
-        (nyu13, nyu40, scannet, semantickitti, ade20k), or the number of classes. Left out, what the files say;
-        where they only number their classes, all of them are read once more to know how many.
+        (nyu13, nyu40, scannet, semantickitti, ade20k, ade20k-32), or the number of classes. Left out, what the
+        files say; where they only number their classes, all of them are read once more to know how many.
     remap
         Turn the classes into others: a class file that says which each one takes in (from), or a built-in
         remapping (ade20k-32-to-nyu13, nyu40-to-nyu13).
@@ -137,7 +132,7 @@ def sources(paths: Sequence[Path], inputs: Inputs = PLAIN) -> Scans:
             why = part.skipped[0][1]
             STDERR.print(f"{path}: {len(part.skipped)} scans skipped, the first because {why}", markup=False)
     chosen = _chosen(sum(len(part) for part in parts), inputs)
-    return Scans(chosen, _Reading(parts, chosen, mapping, count_classes=inputs.classes is None))
+    return Scans(chosen, Reading(parts, chosen, mapping, count_classes=inputs.classes is None))
 
 
 def at_most(scans: Scans, count: int, stride: int) -> Scans:
@@ -152,16 +147,25 @@ def at_most(scans: Scans, count: int, stride: int) -> Scans:
 
 def dropped_labels(scans: Scans) -> dict[str, int]:
     """Return how many labels of each class --remap has dropped from the `sources` that were read so far."""
-    return dict(scans.scan.dropped) if isinstance(scans.scan, _Reading) else {}
+    return dict(scans.scan.dropped) if isinstance(scans.scan, Reading) else {}
 
 
-def tell_dropped(scans: Scans) -> None:
-    """Tell on standard error which labels --remap has dropped; say nothing where it dropped none."""
-    if (dropped := dropped_labels(scans)) and not MANNERS.quiet:
+def tell_labels(scans: Scans) -> None:
+    """Tell on standard error how many of the points that were read have labels, and which --remap has dropped."""
+    reading = scans.scan
+    if MANNERS.quiet or not isinstance(reading, Reading) or not reading.points:
+        return
+    names = [name for name, n in zip(reading.names, reading.labels) if n]
+    lines = [
+        f"{reading.labels.sum():,} of {reading.points:,} points have a label, of {counted(len(names), 'class')}"
+    ]
+    if names and reading.nameless:
+        lines[0] += "; --classes says what their numbers mean"
+    if dropped := dropped_labels(scans):
         words = ", ".join(f"{n:,} of {name}" for name, n in sorted(dropped.items(), key=lambda item: -item[1]))
-        STDERR.print(
-            f"labels that --remap has no class for: {words}", markup=False, highlight=False, soft_wrap=True
-        )
+        lines.append(f"labels that --remap has no class for: {words}")
+    for line in lines:
+        STDERR.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def _chosen(n: int, inputs: Inputs) -> range:
@@ -173,64 +177,3 @@ def _chosen(n: int, inputs: Inputs) -> range:
     if first >= n:
         raise InputError(f"there is no scan {first}: there are {n}, counted from 0.")
     return range(n)[first : None if last is None else last + 1 : every]
-
-
-class _Reading:
-    """Reads scan k of several sequences, all in the same classes."""
-
-    def __init__(
-        self,
-        parts: Sequence[Sequence[LabelledCloud]],
-        chosen: Sequence[int],
-        mapping: ClassFile | None,
-        count_classes: bool,
-    ) -> None:
-        self._parts, self._chosen, self._mapping, self._count_classes = parts, chosen, mapping, count_classes
-        self._counted: set[int] = set()
-        self.dropped: Counter[str] = Counter()
-        self._starts = np.cumsum([0] + [len(part) for part in parts]).tolist()
-        self._classes: Classes | None = None if mapping is None else mapping.classes
-
-    def __call__(self, k: int) -> LabelledCloud:
-        cloud = self._read(k)
-        if self._classes is None:
-            first = cloud if k == self._chosen[0] else self._read(self._chosen[0])
-            self._classes = (
-                self._most_classes() if first.classes.nameless and self._count_classes else first.classes
-            )
-        return cloud if cloud.classes == self._classes else in_classes(cloud, self._classes, f"scan {k}")
-
-    def _most_classes(self) -> Classes:
-        """Return the classes of a scan that names them or, where none does, the most that any scan has."""
-        return max((self._read(k).classes for k in self._chosen), key=lambda c: (not c.nameless, len(c)))
-
-    def _read(self, k: int) -> LabelledCloud:
-        part = bisect_right(self._starts, k) - 1
-        cloud: LabelledCloud = self._parts[part][k - self._starts[part]]
-        if self._mapping is None:
-            return cloud
-        if k not in self._counted:
-            self._counted.add(k)
-            self.dropped.update(without_counterpart(cloud, self._mapping))
-        return remapped(cloud, self._mapping)
-
-
-def in_classes(cloud: LabelledCloud, classes: Classes, what: str) -> LabelledCloud:
-    """Return a cloud in the classes that are wanted: by name or, where it only numbers its own, by number.
-
-    Raises
-    ------
-    InputError
-        A cloud of other classes.
-    """
-    own = cloud.classes
-    if set(own.names) <= set(classes.names):
-        return remapped(cloud, ClassFile(classes))
-    if own.nameless and len(own) <= len(classes):
-        more = len(classes) - len(own)
-        weights = None if cloud.weights is None else np.pad(cloud.weights, ((0, 0), (0, more)))
-        return replace(cloud, classes=classes, weights=weights)
-    raise InputError(
-        f"the classes of {what} ({', '.join(own.names)}) are not those wanted ({', '.join(classes.names)}): "
-        "say what its labels mean with --classes, or turn them into the others with --remap."
-    )

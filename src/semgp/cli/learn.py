@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from rich.progress import Progress
 
 from semgp.blocks.learning import learn_from_scans
@@ -24,6 +25,9 @@ from semgp.writers import atomic_write
 Axis = Literal["x", "y", "z"]
 PAPER = "paper"
 """The name of the whole-scan GP among the models."""
+
+LEAST_OVERLAP = 0.25
+"""Share of places that both halves of the scans must see for a model to be learned from them."""
 
 SAMPLE = (20, 5)
 """A block model is learned from so many scans at most, at most every so many apart."""
@@ -94,13 +98,35 @@ def block_model(name: str, resolution: float | None, vertical: Axis) -> BlockMod
 def learn_blocks(
     sources: Sequence[LabelledCloud], model: BlockModel, vertical: Axis, seed: int, bars: Progress
 ) -> BlockModel:
-    """Return a model learned from scans, with progress."""
+    """Return a model learned from scans, with progress.
+
+    Raises
+    ------
+    InputError
+        Scans of different places, which cannot judge each other.
+    """
+    if (shared := overlap(sources, model.resolution)) < LEAST_OVERLAP:
+        raise InputError(
+            f"the scans see different places: of what one half of them sees, the other sees {shared:.0%}. They "
+            "cannot judge each other's labels, so nothing can be learned. Use a model as it is: semgp build "
+            "--no-learn."
+        )
     bar = bars.add_task("learning the model", total=None)
 
     def show(n: int, loss: float) -> None:
         bars.update(bar, description=f"learning the model: {n} evaluations, log-loss {loss:.4f}")
 
     return learn_from_scans(sources, model, vertical="xyz".index(vertical), seed=seed, progress=show)[0]
+
+
+def overlap(clouds: Sequence[LabelledCloud], resolution: float) -> float:
+    """Return the share of places, four voxels wide, that every other scan sees of what the others see."""
+    edge, labelled = 4 * resolution, [cloud.points[cloud.labelled] for cloud in clouds if cloud.labelled.any()]
+    halves = [np.unique(np.floor(np.concatenate(h) / edge), axis=0) for h in (labelled[::2], labelled[1::2]) if h]
+    if len(halves) < 2:
+        return 1.0  # one scan: for others to refuse
+    both = sum(map(len, halves)) - len(np.unique(np.concatenate(halves), axis=0))
+    return both / max(min(map(len, halves)), 1)
 
 
 def learn_paper(sources: Sequence[LabelledCloud], model: GPModel, iterations: int, bars: Progress) -> GPModel:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from semgp.cli.console import progress, report, score_table
-from semgp.cli.inputs import PLAIN, AnyInputs, in_classes, sources, tell_dropped
+from semgp.cli.inputs import PLAIN, AnyInputs, sources, tell_labels
+from semgp.cli.reading import in_classes
 from semgp.cli.update import Address, Count, Workers
 from semgp.errors import InputError
 from semgp.evaluation.scores import score
@@ -15,7 +16,7 @@ from semgp.executors import open_executor
 from semgp.maps.batches import query_in_batches
 from semgp.maps.files import load_map
 from semgp.maps.points import point_writer, write_prediction
-from semgp.maps.surface import surface_grid
+from semgp.maps.surface import surface_of
 from semgp.readers import open_scans
 from semgp.store import StoredMap
 from semgp.store.asking import query as query_stored
@@ -43,12 +44,12 @@ def query(
     map_file
         A map that `semgp build` wrote.
     out
-        The file to write: .ply, .npz, .pcd, .las or .laz, with label, class colour, probabilities, entropy,
+        The file to write: .ply, .npz, .pcd, .las, .laz or .csv, with label, class colour, probabilities, entropy,
         variance and, from maps with free space, occupancy and state (1 occupied, 0 free, -1 unknown).
     points
         A point file: the query points.
     resolution
-        Instead of points, the spacing in metres of a grid along the mapped surface.
+        Instead of points, the spacing in metres of points along the mapped surface; any will do.
     executor
         Who asks a store: the threads of this process, or a Ray cluster.
     workers
@@ -66,7 +67,7 @@ def query(
     if points is not None:
         X = np.concatenate([cloud.points for cloud in open_scans(points)])
     else:
-        X = surface_grid(semantic_map.positions, resolution)
+        X = surface_of(semantic_map, resolution)
     with progress() as bars:
         asking = bars.add_task("asking the map", total=None if many else len(X))
         if many and isinstance(semantic_map, StoredMap):
@@ -95,7 +96,7 @@ def evaluate(map_file: Path, /, *, truth: Path, inputs: AnyInputs = PLAIN) -> No
     scans = sources([truth], inputs)
     clouds = (in_classes(cloud, semantic_map.classes, str(truth)) for cloud in scans)
     X, labels = map(np.concatenate, zip(*((cloud.points, cloud.hard_labels) for cloud in clouds)))
-    tell_dropped(scans)
+    tell_labels(scans)
     with progress() as bars:
         asking = bars.add_task("asking the map", total=len(X))
         prediction = query_in_batches(semantic_map, X, lambda n, _: bars.update(asking, completed=n))

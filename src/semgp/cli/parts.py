@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+from semgp.blocks.model import BlockModel
 from semgp.checks import rigid_transform
 from semgp.cli.console import progress, report
 from semgp.errors import FileFormatError, InputError
@@ -43,7 +45,15 @@ def crop(map_place: Path, /, *, low: Corner, high: Corner, out: Path) -> None:
     report(f"{out}: {len(part):,} sites", out=out, sites=len(part))
 
 
-def fuse(map_place: Path, other: Path, /, *, out: Path, transform: Path | None = None) -> None:
+def fuse(
+    map_place: Path,
+    other: Path,
+    /,
+    *,
+    out: Path,
+    transform: Path | None = None,
+    model: Literal["first", "second"] | None = None,
+) -> None:
     """Join two maps that were built apart into one of all that both have seen.
 
     Example: semgp fuse robot-1.semgp robot-2.semgp --out both.semgp
@@ -62,15 +72,27 @@ def fuse(map_place: Path, other: Path, /, *, out: Path, transform: Path | None =
     transform
         A text file with the 4 x 4 matrix that takes the other map's frame to the first one's; left out, they share
         a frame.
+    model
+        Where each map has learned a model of its own: whose the result is to have. Better is one model for both,
+        learned from the scans of both: "semgp learn A B --out model.json", "semgp build A --model model.json".
     """
     a, b = (_gp_map(path) for path in (map_place, other))
+    if a.model != b.model and model is None:
+        raise InputError(
+            f"{map_place} and {other} have learned models of their own. Say which one the result is to have with "
+            "--model first or second. Better is one for both: `semgp learn A B --out model.json`, then `semgp "
+            "build A --model model.json`, and B likewise."
+        )
+    chosen = (b if model == "second" else a).model
     T_a_b = None if transform is None else _matrix(transform)
     with progress() as bars:
         bars.add_task("joining the maps", total=None)
-        if isinstance(a, StoredMap) and isinstance(b, StoredMap) and not is_file_name(out):
+        stored = isinstance(a, StoredMap) and isinstance(b, StoredMap) and not is_file_name(out)
+        if stored and isinstance(a, StoredMap) and isinstance(b, StoredMap) and a.model == b.model:
             sites = fuse_stored(a, b, out, T_a_b, note=f"{map_place} and {other}").sites
         else:
-            joined = fuse_maps(_loaded(a), _loaded(b), T_a_b)
+            whose = chosen if a.model != b.model and isinstance(chosen, BlockModel) else None
+            joined = fuse_maps(_loaded(a), _loaded(b), T_a_b, model=whose)
             _save(joined, out, f"{map_place} and {other}")
             sites = len(joined)
     report(f"{out}: {sites:,} sites from {len(a):,} and {len(b):,}", out=out, sites=sites)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from semgp.cli.inputs import PLAIN, AnyInputs, sources
+from semgp.errors import InputError
 
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 Upward = Annotated[Literal["x", "y", "z", "-x", "-y", "-z"], Parameter(allow_leading_hyphen=True)]
@@ -62,7 +63,7 @@ def render(
     size
         Width and height of each picture in pixels.
     up
-        The axis of the map that points upwards; -y for a depth camera's own frame.
+        The axis of the map that points upwards; -y for maps in a camera's frame, as RGB-D recordings make them.
     azimuth
         The side that the eye is on, in degrees about the upward axis: with z up, 0 is +x and 90 is +y. Left out,
         that from which most is seen.
@@ -94,16 +95,20 @@ def render(
     from semgp.picture.camera import TOP, Camera, below, direction
     from semgp.picture.coverage import picture_resolution, surface_points
     from semgp.picture.image import Picture, require_png, save_png
+    from semgp.picture.paint import require_colours
     from semgp.picture.portrait import cloud_layers, map_layers, portrait
     from semgp.picture.splat import DARK, WHITE
     from semgp.picture.view import View
 
     (require_animation if orbit else require_png)(out)
+    if not all(16 <= pixels <= 16_384 for pixels in size):
+        raise InputError(f"a picture has 16 to 16,384 pixels along each side, not {size[0]} x {size[1]}.")
     upward, ground = direction(up), DARK if dark else WHITE
     camera = Camera(azimuth, TOP if top else elevation, zoom, upward)
     names = [name.strip() for name in by.split(",")]
     with progress() as bars:
         semantic_map = load_map(map_file)
+        require_colours(semantic_map.classes, [name for name in names if name != "rgb"])
         positions = below(semantic_map.positions, cut, upward)
         edge = picture_resolution(positions, max(size)) if resolution is None else resolution
         points = surface_points(positions, edge)

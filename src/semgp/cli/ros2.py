@@ -36,6 +36,8 @@ def topics(bag: Path, /) -> None:
     from semgp.logs.frames import NS
     from semgp.logs.poses import frames_of
 
+    if not bag.exists():
+        raise InputError(f"{bag}: no such file or folder.")
     if not is_bag(bag):
         raise InputError(
             f"{bag} is no robot log: give a .bag, .mcap or .db3 file, or a folder with metadata.yaml."

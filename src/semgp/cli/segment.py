@@ -51,7 +51,7 @@ def segment(
         Label images again that have labels in the folder.
     """
     from semgp.class_files import class_list, remapping
-    from semgp.cli.console import keeping, progress, report
+    from semgp.cli.console import counted, keeping, progress, report
     from semgp.segmentation import images_of, segmenter_of
     from semgp.segmentation.folder import segment_images, unlabelled
 
@@ -74,9 +74,11 @@ def segment(
             labelled.append(fraction)
     seconds = time.perf_counter() - begin
     share = sum(labelled) / len(labelled) if labelled else 0.0
+    words = f"{out}: {counted(len(labelled), 'image')} labelled in {seconds:.1f} s"
+    if labelled:
+        words += f"; {share:.1%} of the pixels have one of {len(segmenter.classes)} classes"
     report(
-        f"{out}: {len(labelled):,} images labelled in {seconds:.1f} s, {len(paths) - len(todo):,} were there; "
-        f"{share:.1%} of the pixels have one of {len(segmenter.classes)} classes",
+        words + ("" if todo == paths else f"; {len(paths) - len(todo):,} were labelled already"),
         out=out,
         images=len(labelled),
         kept=len(paths) - len(todo),

@@ -8,7 +8,7 @@ from cyclopts import App
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from semgp.cli.console import progress, report
+from semgp.cli.console import counted, progress, report
 from semgp.errors import FileFormatError
 from semgp.store import MapStore
 
@@ -78,7 +78,9 @@ def prune(place: Path, /, *, keep: int) -> None:
     store = MapStore(place)
     store.manifest()
     gone = store.prune(keep)
-    report(f"{place}: {len(store.numbers())} versions, {gone} files removed", files_removed=gone)
+    report(
+        f"{place}: {counted(len(store.numbers()), 'version')}, {counted(gone, 'file')} removed", files_removed=gone
+    )
 
 
 @store_app.command
@@ -126,4 +128,4 @@ def clean(place: Path, /, *, older_than: float = 24.0) -> None:
         Hours: files younger than that may belong to a writer at work.
     """
     gone = MapStore(place).clean(3600 * older_than)
-    report(f"{place}: {gone} files removed", files_removed=gone)
+    report(f"{place}: {counted(gone, 'file')} removed", files_removed=gone)

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 from rich.progress import Progress
 
-from semgp.cli.console import keeping, progress, report
-from semgp.cli.inputs import PLAIN, AnyInputs, sources, tell_dropped
+from semgp.cli.console import counted, keeping, progress, report
+from semgp.cli.inputs import PLAIN, AnyInputs, sources, tell_labels
 from semgp.errors import InputError
 from semgp.executors import open_executor
 from semgp.maps.files import load_map, save_map
@@ -22,6 +22,12 @@ from semgp.store import build as build_stored
 Workers = Annotated[Literal["threads", "ray"], Parameter(group="Many machines")]
 Address = Annotated[str | None, Parameter(group="Many machines")]
 Count = Annotated[int | None, Parameter(group="Many machines")]
+
+WHERE_LABELS = (
+    "Say where labels are with --field (point files) or --labels (data sets, label folders), what they mean with "
+    "--classes, or have a --network label images."
+)
+"""What to do about scans without labels."""
 
 BUILDING = "build"
 """The note of versions that a build makes, on the way and at its end."""
@@ -65,10 +71,10 @@ def update(
         raise InputError("--executor is for stores, and this map is one file.")
     with progress() as bars:
         fill(semantic_map, clouds, bars)
-    tell_dropped(clouds)
+    tell_labels(clouds)
     save_map(semantic_map, map_place)
     n = len(semantic_map)
-    report(f"{map_place}: {n:,} elements with {len(clouds)} scans more", out=map_place, elements=n)
+    report(f"{map_place}: {n:,} elements with {counted(len(clouds), 'scan')} more", out=map_place, elements=n)
 
 
 def fill(semantic_map: SerialisableMap, clouds: Scans, bars: Progress) -> None:
@@ -76,7 +82,7 @@ def fill(semantic_map: SerialisableMap, clouds: Scans, bars: Progress) -> None:
     for cloud in bars.track(clouds, description="building the map"):
         semantic_map.update(cloud)
     if not len(semantic_map):
-        raise InputError("no scan has a label: nothing to build a map from.")
+        raise InputError(f"no scan has a label: nothing to build a map from. {WHERE_LABELS}")
     if isinstance(semantic_map, GPSemanticMap):
         semantic_map.solve()
 
@@ -107,13 +113,13 @@ def update_store(
                 build_stored(store, left, work, note=note, steps=lambda n: bars.update(bar, advance=n))
         else:
             _update_in_order(store, left, note, bars)
-    tell_dropped(clouds)
+    tell_labels(clouds)
     manifest = store.manifest()
     if not manifest.sites:
-        raise InputError(f"no scan has a label: {place} holds an empty map.")
+        raise InputError(f"no scan has a label: {place} holds an empty map. {WHERE_LABELS}")
     report(
-        f"{place}: version {manifest.number}, {manifest.sites:,} sites from {manifest.clouds} scans in "
-        f"{len(manifest.tiles)} tiles, {manifest.n_bytes / 1e6:.1f} MB",
+        f"{place}: version {manifest.number}, {manifest.sites:,} sites from {counted(manifest.clouds, 'scan')} in "
+        f"{counted(len(manifest.tiles), 'tile')}, {manifest.n_bytes / 1e6:.1f} MB",
         out=place, version=manifest.number, sites=manifest.sites, scans=manifest.clouds, bytes=manifest.n_bytes,
     )  # fmt: skip
 

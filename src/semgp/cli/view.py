@@ -73,7 +73,7 @@ def view(
     resolution
         Metres between the points that the map is asked at; left out, as its data are. The viewer changes it.
     up
-        The axis of the map that points upwards; -y for a depth camera's own frame.
+        The axis of the map that points upwards; -y for maps in a camera's frame, as RGB-D recordings make them.
     title
         Heading; left out, the name of the map.
     cloud
@@ -124,7 +124,8 @@ def view(
     with viewer, contextlib.suppress(KeyboardInterrupt):
         report(f"open {viewer.url} in a browser; Ctrl-C ends it", url=viewer.url)
         sys.stdout.flush()
-        threading.Event().wait()
+        while not threading.Event().wait(0.5):  # a signal that another thread has caught is seen here, too
+            pass
 
 
 def _write(

@@ -14,7 +14,7 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.picture.colour import by_class
 from semgp.prediction import Prediction
-from semgp.writers import write_las, write_npz, write_pcd, write_ply
+from semgp.writers import write_csv, write_las, write_npz, write_pcd, write_ply
 
 
 class PointWriter(Protocol):
@@ -54,6 +54,7 @@ POINT_WRITERS: dict[str, PointWriter] = {
     ".pcd": write_pcd,
     ".las": write_las,
     ".laz": write_las,
+    ".csv": write_csv,
 }
 """What writes a point file, by its suffix."""
 

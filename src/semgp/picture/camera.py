@@ -17,7 +17,7 @@ F64 = NDArray[np.float64]
 
 TOP = 90.0
 """Elevation of a view from straight above."""
-_FRAMED = 0.9995
+_FRAMED = 0.9999
 """Share of the points that a view keeps inside of each edge of its frame."""
 _ASKED = 20_000
 """Points, at most, that are looked at to find the best side."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,11 +79,17 @@ def paint(prediction: Prediction, by: str) -> Paint:
             raise InputError("this map has no variance: colour it by entropy or confidence.")
         top = prediction.probability.argmax(axis=1)[:, None]
         return paint_values(by, _seen(np.take_along_axis(prediction.variance, top, axis=1)[:, 0], prediction), 0.0)
-    if by not in prediction.classes.names:
-        known = ", ".join([*QUANTITIES, *prediction.classes.names])
-        raise InputError(f"a map cannot be coloured by {by!r}; choose from {known}.")
+    require_colours(prediction.classes, [by])
     probability = prediction.probability[:, prediction.classes.index(by)]
     return paint_values(f"probability of {by}", _seen(probability, prediction), 0.0, 1.0)
+
+
+def require_colours(classes: Classes, names: Sequence[str]) -> None:
+    """Raise InputError for a name that is neither a quantity nor a class."""
+    for name in names:
+        if name not in (*QUANTITIES, *classes.names):
+            known = ", ".join([*QUANTITIES, *classes.names])
+            raise InputError(f"a map cannot be coloured by {name!r}; choose from {known}.")
 
 
 def paint_labels(title: str, labels: NDArray[np.integer], classes: Classes, missing: str) -> Paint:

@@ -83,6 +83,11 @@ class PointFolderReader:
         options = {name: value for name, value in wanted.items() if value is not None}
         if unknown := [name for name in options if name not in options_of(reader)]:
             raise InputError(f"{path}: the format {reader.name} of its files has no option {unknown[0]!r}.")
+        if poses is None and len(files) > 1 and path.name == "velodyne" and (path.parent / "poses.txt").is_file():
+            raise InputError(
+                f"{path} holds scans in the lidar's own frame, and their poses lie beside it: give the folder "
+                f"{path.parent}, or --poses FILE with poses of the lidar."
+            )
         if poses is None:
             return Scans(range(len(files)), lambda i: reader.read(files[i], **options))
         T, stamps = _poses_of(Path(poses), read_trajectory(poses), files)

@@ -26,7 +26,7 @@ from semgp.store.store import MapStore
 Part = dict[int, Arrays]
 """What some clouds add to some tiles."""
 
-BATCH = 16
+BATCH = 8
 """Clouds a worker between one version and the next."""
 
 _CHUNK = 4  # clouds that one piece of work sums up: fewer parts to put together

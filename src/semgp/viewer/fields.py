@@ -75,7 +75,7 @@ def field_values(prediction: Prediction, name: str) -> NDArray[np.floating]:
 
 
 def field_scale(prediction: Prediction, name: str) -> Scale:
-    """Return the ends of a field's colours: fixed ones, but for the variance, whose least and most are those met.
+    """Return the ends of a field's colours: fixed ones, but for variance and entropy, which depend on those met.
 
     Raises
     ------
@@ -84,7 +84,8 @@ def field_scale(prediction: Prediction, name: str) -> Scale:
     """
     values = field_values(prediction, name)
     if name == "entropy":
-        return Scale(0.0, math.log(max(2, len(prediction.classes))))
+        met = values[np.isfinite(values)]
+        return Scale(0.0, max(float(met.max()), 1e-3) if len(met) else math.log(2))
     if name != "variance":
         return Scale(0.0, 1.0)
     finite = values[np.isfinite(values)]

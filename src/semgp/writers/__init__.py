@@ -6,6 +6,7 @@ from semgp.writers.las import write_las
 from semgp.writers.npz import write_npz
 from semgp.writers.pcd import write_pcd
 from semgp.writers.ply import ply_header, write_ply
+from semgp.writers.text import write_csv
 
 __all__ = [
     "LARGEST_ROUNDING",
@@ -14,6 +15,7 @@ __all__ = [
     "coordinates",
     "ply_header",
     "structured",
+    "write_csv",
     "write_las",
     "write_npz",
     "write_pcd",

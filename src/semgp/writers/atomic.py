@@ -26,7 +26,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        The folder does not exist.
+        The folder does not exist, or cannot be written to.
     """
     path = Path(path)
     if not path.parent.is_dir():
@@ -37,5 +37,9 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
         temporary.replace(path)
+    except OSError as error:
+        if error.filename is None or Path(error.filename).name != temporary.name:
+            raise
+        raise InputError(f"cannot write {path}: {error.strerror or error}.") from error
     finally:
         temporary.unlink(missing_ok=True)
