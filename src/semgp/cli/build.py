@@ -131,23 +131,22 @@ def build(
         return
     free = FreeSpace() if free_space or half_life is not None else None
     forgetting = None if half_life is None else Forgetting(half_life)
+    classes = clouds[0].classes
     with progress() as bars:
         semantic_map: SerialisableMap
         if kind != "gp":
-            semantic_map = MAP_KINDS[kind](clouds[0].classes)  # type: ignore[call-arg]
+            semantic_map = MAP_KINDS[kind](classes)  # type: ignore[call-arg]
         elif model == PAPER:
             start = GPModel(max_points=max_points, n_inducing=inducing, seed=seed)
-            semantic_map = GPSemanticMap(
-                clouds[0].classes, learn_paper(clouds, start, iterations, bars) if learn else start
-            )
+            paper = learn_paper(clouds, start, iterations, bars) if learn else start
+            semantic_map = GPSemanticMap(classes, paper)
         else:
             blocks = _blocks(clouds, model, resolution, vertical, learn, seed, bars)
-            if not one_file:
-                MapStore(out).create(Settings(clouds[0].classes, blocks, free, forgetting), BUILDING)
-            semantic_map = GPSemanticMap(clouds[0].classes, blocks, free=free, forgetting=forgetting)
+            semantic_map = GPSemanticMap(classes, blocks, free=free, forgetting=forgetting)
         if one_file:
             fill(semantic_map, clouds, bars)
     if not one_file:
+        MapStore(out).create(Settings(classes, blocks, free, forgetting), BUILDING)
         update_store(out, clouds, executor, workers, address, done=0)
         _drop_steps(out)
         return

@@ -142,11 +142,9 @@ class ManyBlocks:
             self._put(prefix, field.only(np.flatnonzero(keep(field.sites.cells.keys)).astype(np.int32)))
 
     def begin(self, origin: I64, clock: float | None) -> None:
-        """Set where the keys of a map begin, and its time; it may be earlier than that of cells without sites."""
+        """Set where the keys of a map begin, and its time, not earlier than what the map has seen."""
         for field in self.fields.values():
             field.sites.origin, field.sites.clock = origin, clock
-            if clock is not None:
-                np.minimum(field.sites.time, clock, out=field.sites.time)
 
     @property
     def origin(self) -> I64 | None:

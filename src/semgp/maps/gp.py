@@ -219,7 +219,12 @@ class GPSemanticMap:
             A header or arrays that do not belong together.
         """
         state = (ManyBlocks if header["blocks"] else WholeScan).from_arrays(classes, header, arrays)
-        made = cls(classes, state.model)
+        return cls.of_state(state)
+
+    @classmethod
+    def of_state(cls, state: ManyBlocks | WholeScan) -> Self:
+        """Make a map of its blocks or its training set."""
+        made = cls(state.classes, state.model)
         made._state = state
         return made
 

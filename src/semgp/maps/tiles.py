@@ -21,6 +21,7 @@ from semgp.voxels import AXIS_BITS, HALF_RANGE, STEP, voxel_indices, voxel_keys
 Arrays = dict[str, NDArray[Any]]
 
 _ROWS = ("voxels", "mass", "place", "spread")
+_TIMES = ("cells", "time")
 
 
 @dataclass(frozen=True)
@@ -133,18 +134,17 @@ def _by_tile(tiling: Tiling, tiles: I64, keys: I64) -> dict[int, I64]:
     return {int(tile): rows[a:b] for tile, a, b in zip(np.sort(tiles), *edges)}
 
 
-def take_in(state: ManyBlocks, tiling: Tiling, tile: int, origin: I64, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Add the stored arrays of a tile to a map that has nothing of it.
+def take_in(state: ManyBlocks, origin: I64, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Add the arrays of a tile, from `cut` or checked by `tile_sites`, to a map that has nothing of it.
 
     Raises
     ------
     InputError
-        Arrays that are damaged, or are not of this tile.
+        Sites that the map has.
     """
     for prefix, field in state.fields.items():
-        field.restore(
-            tile_sites(arrays, prefix, tiling, tile, origin, field.sites.mass.shape[1], field.model.n_dims)
-        )
+        sites = {name: arrays[prefix + name] for name in (*_ROWS, *_TIMES) if prefix + name in arrays}
+        field.restore(sites | {"origin": origin})
 
 
 def tile_sites(

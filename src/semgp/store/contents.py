@@ -26,10 +26,9 @@ def in_memory(
     state = settings.new_state()
     if origin is not None:
         state.begin(origin, clock)
-        for tile, arrays in parts:
-            take_in(state, settings.tiling, tile, origin, arrays)
-    header, arrays = state.to_arrays()
-    return GPSemanticMap.from_arrays(settings.classes, {"blocks": True, **header}, arrays)
+        for _, arrays in parts:
+            take_in(state, origin, arrays)
+    return GPSemanticMap.of_state(state)
 
 
 def labelled_positions(settings: Settings, arrays: Arrays, origin: I64) -> F64:

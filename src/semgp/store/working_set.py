@@ -67,7 +67,7 @@ class WorkingSet:
     def _take_in(self, tile: int, arrays: Arrays) -> None:
         assert self.state.origin is not None
         try:
-            take_in(self.state, self.settings.tiling, tile, self.state.origin, arrays)
+            take_in(self.state, self.state.origin, arrays)
         except InputError as error:
             self._drop([tile])
             raise FileFormatError(
