@@ -33,6 +33,35 @@ def ply(path: Path, header: str, body: bytes = b"") -> Path:
     return path
 
 
+SIGNALLING = struct.pack("<I", 0x7F810000)
+"""A NaN that raises a flag in the processor whenever it is computed with."""
+
+FLOATS = ("x", "y", "z", "label", "prob_0", "prob_1", "red", "green", "blue", "intensity")
+
+
+@pytest.mark.parametrize(
+    ("at", "problem"),
+    [
+        *((at, None) for at in range(4)),
+        *((at, "weights has NaN") for at in (4, 5)),
+        *((at, "colours that are not whole numbers") for at in (6, 7, 8)),
+        (9, "features has NaN"),
+    ],
+)
+def test_a_signalling_nan_is_a_nan_like_any_other(at: int, problem: str | None, tmp_path: Path) -> None:
+    properties = "".join(f"property float {name}\n" for name in FLOATS)
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex 2\n{properties}end_header\n"
+    body = bytearray(struct.pack("<20f", *2 * (0, 1, 2, 1, 0.5, 0.5, 10, 20, 30, 4)))
+    body[4 * at : 4 * at + 4] = SIGNALLING
+    path = ply(tmp_path / "a.ply", header, bytes(body))
+    if problem:
+        with pytest.raises(FileFormatError, match=problem):
+            read(path, features=("intensity",))
+    else:
+        cloud = read(path, features=("intensity",))
+        assert len(cloud) == (2 if at == 3 else 1)
+
+
 def ascii_ply(path: Path, properties: str, rows: str, count: int | None = None) -> Path:
     """Write an ASCII PLY file; `properties` is a list such as "float x, uchar label"."""
     lines = [f"property {p.strip()}" for p in properties.split(",")]

@@ -183,7 +183,9 @@ def _colours(node: Any, columns: dict[str, NDArray[np.float64]]) -> dict[str, ND
         low, high = 0.0, 255.0
         if node.isDefined("colorLimits"):
             low, high = (float(node["colorLimits"][f"{field}{end}"].value()) for end in ("Minimum", "Maximum"))
-        found[name] = np.round((columns[field] - low) * (255 / (high - low))) if high > low else columns[field]
+        with np.errstate(over="ignore", invalid="ignore"):  # what is no colour is refused with the other fields
+            scaled = np.round((columns[field] - low) * (255 / (high - low))) if high > low else columns[field]
+        found[name] = scaled
     return found
 
 

@@ -189,6 +189,8 @@ def _colours(path: Path, columns: Columns, kept: NDArray[np.bool_]) -> NDArray[n
     if not all(name in columns for name in names):
         return None
     rgb = np.stack([columns[name] for name in names], axis=1)[kept]
-    if not ((rgb >= 0) & (rgb <= 255) & (rgb == np.round(rgb))).all():
+    with np.errstate(invalid="ignore"):  # a NaN is no whole number
+        whole = (rgb >= 0) & (rgb <= 255) & (rgb == np.round(rgb))
+    if not whole.all():
         raise FileFormatError(path, "has colours that are not whole numbers from 0 to 255.")
     return rgb.astype(np.uint8)
