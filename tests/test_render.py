@@ -18,7 +18,7 @@ from semgp.maps.free_space import FreeSpace
 from semgp.maps.gp import GPSemanticMap
 from semgp.picture import DARK, GREY, View, splat
 from semgp.picture.animation import save_animation
-from semgp.picture.camera import Camera, below, direction
+from semgp.picture.camera import Camera, below
 from semgp.picture.coverage import picture_resolution, spacing_of, surface_points
 from semgp.picture.paint import Bar, paint, paint_labels
 from semgp.picture.portrait import (
@@ -33,6 +33,7 @@ from semgp.picture.portrait import (
 from semgp.planning.section import section
 from semgp.prediction import OccupancyPrediction, Prediction
 from semgp.surfaces import Mesh, write_mesh
+from semgp.upward import direction
 from tests.conftest import THREE
 
 F64 = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
+from semgp.upward import Up
+
+
+class Camera(Protocol):
+    """What makes points of depth images: `Pinhole`, or `semgp.distortion.DistortedCamera`."""
+
+    def back_project(
+        self, depth_m: ArrayLike, max_depth: float = math.inf
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the point that each pixel sees, and where it sees one; see `Pinhole.back_project`."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -70,13 +81,8 @@ class Pinhole:
         InputError
             A depth image that is not two-dimensional.
         """
-        with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN like any other
-            depth = np.asarray(depth_m, dtype=np.float64)
-        if depth.ndim != 2:
-            raise InputError(f"a depth image must have shape (H, W), not {depth.shape}.")
-        valid = np.isfinite(depth) & (depth > 0) & (depth <= max_depth)
-        z = np.where(valid, depth, np.nan)
-        u, v = np.arange(depth.shape[1]), np.arange(depth.shape[0])[:, None]
+        z, valid = valid_depths(depth_m, max_depth)
+        u, v = np.arange(z.shape[1]), np.arange(z.shape[0])[:, None]
         return np.stack([(u - self.cx) * z / self.fx, (v - self.cy) * z / self.fy, z], axis=-1), valid
 
 
@@ -84,15 +90,26 @@ NYU_CAMERA = Pinhole(fx=518.857901, fy=519.469611, cx=325.582245, cy=253.736166)
 """Colour camera of NYU Depth V2, from its toolbox; its depth images are registered to it."""
 
 
+def valid_depths(depth_m: ArrayLike, max_depth: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return a depth image with NaN where it is not valid, and where it is; see `Pinhole.back_project`."""
+    with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN like any other
+        depth = np.asarray(depth_m, dtype=np.float64)
+    if depth.ndim != 2:
+        raise InputError(f"a depth image must have shape (H, W), not {depth.shape}.")
+    valid = np.isfinite(depth) & (depth > 0) & (depth <= max_depth)
+    return np.where(valid, depth, np.nan), valid
+
+
 def cloud_from_depth(
     depth_m: ArrayLike,
-    camera: Pinhole,
+    camera: Camera,
     classes: Classes,
     labels: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     colours: ArrayLike | None = None,
     T_world_sensor: ArrayLike | None = None,
     max_depth: float = 10.0,
+    up: Up | None = None,
 ) -> LabelledCloud:
     """Return the cloud of the valid pixels of an RGB-D frame, row by row.
 
@@ -100,8 +117,8 @@ def cloud_from_depth(
     ----------
     depth_m : (H, W) array
         Depth in metres; pixels without a valid one (see `Pinhole.back_project`) are left out.
-    camera : Pinhole
-        Intrinsics of the camera to which all images are registered.
+    camera : Pinhole or DistortedCamera
+        The camera to which all images are registered.
     classes : Classes
         The classes that the labels speak of.
     labels : (H, W) integer array, optional
@@ -114,6 +131,8 @@ def cloud_from_depth(
         Pose of the camera's optical frame in the world. Left out, the camera's frame is the world.
     max_depth : float
         Depths beyond it, in metres, are left out.
+    up : str, optional
+        The axis of the world that points upwards. Left out, "z", or "-y" where the camera's frame is the world.
 
     Raises
     ------
@@ -146,4 +165,5 @@ def cloud_from_depth(
         T_world_sensor=pose,
         pixels=np.argwhere(valid).astype(np.int32),
         image_shape=(rows, columns),
+        up=up or ("-y" if T_world_sensor is None else "z"),
     )

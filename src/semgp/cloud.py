@@ -21,6 +21,7 @@ from semgp.checks import (
 )
 from semgp.classes import MISSING, Classes
 from semgp.errors import InputError
+from semgp.upward import Up, vertical
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +60,14 @@ class LabelledCloud:
         Row and column of each point in the image it came from.
     image_shape : (int, int), optional
         Rows and columns of that image.
+    up : str, optional
+        The axis of the world that points upwards, see `semgp.upward`: "z", or "-y" in a camera's frame.
 
     Raises
     ------
     InputError
         Lengths that differ, points or features that are not finite, labels out of range, a pose that is no
-        rigid transform, covariances that are none, or both hard and soft labels.
+        rigid transform, covariances that are none, no axis that is up, or both hard and soft labels.
     """
 
     points: NDArray[np.float64]
@@ -81,6 +84,7 @@ class LabelledCloud:
     stamp: float | None = None
     pixels: NDArray[np.int32] | None = None
     image_shape: tuple[int, int] | None = None
+    up: Up = "z"
 
     def __post_init__(self) -> None:
         points = as_array("points", self.points, np.float64)
@@ -122,6 +126,7 @@ class LabelledCloud:
             raise InputError(f"stamp must be a time in seconds, not {self.stamp}.")
         if self.pixels is not None:
             set_field(self, "pixels", as_rows("pixels", self.pixels, n, 2, np.int32))
+        vertical(self.up)
 
     def __len__(self) -> int:
         return len(self.points)

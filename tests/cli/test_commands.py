@@ -178,7 +178,7 @@ class TestBlockModels:
     @pytest.mark.parametrize("preset", ["general", "indoor-rgbd", "indoor-labels", "outdoor-lidar", "paper"])
     def test_every_preset_builds_a_map(self, preset: str, scans: list[Path]) -> None:
         out = scans[0].with_name("map.semgp")
-        options = ("--no-learn", "--vertical", "y", "--inducing", "30")
+        options = ("--no-learn", "--up", "y", "--inducing", "30")
         assert run("build", *scans, "--model", preset, "--out", out, "--quiet", *options) == 0
 
     @pytest.mark.parametrize(

@@ -98,12 +98,13 @@ def test_files_give_the_same_map_to_the_last_bit(
     make: Callable[[Classes], SerialisableMap], corner: LabelledCloud, tmp_path: Path
 ) -> None:
     semantic_map = built(make, corner)
+    semantic_map.up = "-x"
     before = semantic_map.query(corner.points)
     save_map(semantic_map, tmp_path / "corner.semgp")
     loaded = load_map(tmp_path / "corner.semgp")
     after = loaded.query(corner.points)
     assert type(loaded) is type(semantic_map)
-    assert loaded.classes == semantic_map.classes
+    assert (loaded.classes, loaded.up) == (semantic_map.classes, "-x")
     assert len(loaded) == len(semantic_map)
     np.testing.assert_array_equal(after.probability, before.probability)
     np.testing.assert_array_equal(after.observed, before.observed)
@@ -117,7 +118,7 @@ def test_utm_coordinates_keep_their_digits(
     make: Callable[[Classes], SerialisableMap], corner: LabelledCloud
 ) -> None:
     if make is MAKERS["octomap"]:
-        pytest.skip("OctoMap's keys reach 32,768 voxels from the origin; tests/test_octomap.py checks its error")
+        pytest.skip("OctoMap's keys reach 32,768 voxels from the origin; tests/octomap checks its error")
     shift = np.array([500_000.0, 5_000_000.0, 256.0])  # whole cells of the block map
     T = np.eye(4)
     T[:3, 3] = corner.T_world_sensor[:3, 3] + shift  # type: ignore[index]

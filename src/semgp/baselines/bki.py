@@ -17,6 +17,7 @@ from semgp.maps.protocol import query_points, training_part
 from semgp.maps.settings import require_data, require_positive, stored_setting
 from semgp.parallel import parallel_map, slices
 from semgp.prediction import Prediction
+from semgp.upward import Up
 
 _MOST_VOXELS = 32  # the number of voxels that a label reaches grows with the cube of this
 _CHUNK = 16_384  # points that one thread smooths at a time, neighbours in space
@@ -59,6 +60,7 @@ class BKIMap:
     """
 
     kind = "bki"
+    up: Up = "z"
 
     def __init__(
         self,

@@ -14,6 +14,7 @@ from semgp.cloud import LabelledCloud
 from semgp.maps.protocol import query_points, training_part
 from semgp.maps.settings import require_data, require_positive, require_prior, stored_setting
 from semgp.prediction import Prediction
+from semgp.upward import Up
 
 
 class CSMMap:
@@ -44,6 +45,7 @@ class CSMMap:
     """
 
     kind = "csm"
+    up: Up = "z"
 
     def __init__(self, classes: Classes, resolution: float = 0.02, alpha0: float = 0.0) -> None:
         self.classes = classes

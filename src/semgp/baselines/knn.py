@@ -17,6 +17,7 @@ from semgp.maps.protocol import query_points, training_part
 from semgp.maps.settings import require_data, require_positive, require_prior, stored_array, stored_setting
 from semgp.parallel import parallel_map, slices
 from semgp.prediction import Prediction
+from semgp.upward import Up
 
 _SETTINGS = ("k", "width", "kernel", "max_distance", "alpha0")
 _CHUNK = 4_096  # query points that one thread answers at a time
@@ -57,6 +58,7 @@ class KNNMap:
     """
 
     kind = "knn"
+    up: Up = "z"
 
     def __init__(
         self,

@@ -12,8 +12,8 @@ from rich.progress import Progress
 
 from semgp.blocks.model import BlockModel
 from semgp.cli.console import counted, progress, report
-from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources, tell_labels
-from semgp.cli.learn import LEAST_OVERLAP, PAPER, SAMPLE, Axis, block_model, learn_blocks, learn_paper, overlap
+from semgp.cli.inputs import PLAIN, AnyInputs, Upward, at_most, sources, tell_labels
+from semgp.cli.learn import LEAST_OVERLAP, PAPER, SAMPLE, block_model, learn_blocks, learn_paper, overlap
 from semgp.cli.update import BUILDING, Address, Count, Workers, fill, update_store
 from semgp.errors import InputError
 from semgp.gp.model import GPModel
@@ -27,6 +27,7 @@ from semgp.maps.protocol import SerialisableMap
 from semgp.readers import Scans
 from semgp.store import MapStore, Settings
 from semgp.store.bucket import as_url
+from semgp.upward import Up
 
 Kind = Literal["gp", "octomap", "knn", "csm", "bki"]
 PaperNumber = Annotated[int, Parameter(group="The paper's GP")]
@@ -41,7 +42,7 @@ def build(
     kind: Kind = "gp",
     model: str = "general",
     resolution: float | None = None,
-    vertical: Axis = "z",
+    up: Upward = None,
     learn: bool = True,
     free_space: bool = False,
     half_life: float | None = None,
@@ -79,8 +80,9 @@ def build(
         that are right; a file that "semgp learn" wrote; or paper, the whole-scan GP of the paper.
     resolution
         Edge in metres of the voxels in which labels are added up, instead of the model's.
-    vertical
-        The axis of gravity in the scans' world.
+    up
+        The axis of the scans' world that points upwards. Left out, what the scans say: z, but for RGB-D recordings
+        the axis that their cameras hold upwards, often -y.
     learn
         With two scans or more, learn the model from their labels, from the preset on; a model file is taken as it
         is. Of long sequences, 20 scans from the middle teach it, five apart. The paper's GP learns from the first
@@ -131,7 +133,7 @@ def build(
         return
     free = FreeSpace() if free_space or half_life is not None else None
     forgetting = None if half_life is None else Forgetting(half_life)
-    classes = clouds[0].classes
+    classes, up = clouds[0].classes, up or clouds[0].up
     with progress() as bars:
         semantic_map: SerialisableMap
         if kind != "gp":
@@ -141,12 +143,13 @@ def build(
             paper = learn_paper(clouds, start, iterations, bars) if learn else start
             semantic_map = GPSemanticMap(classes, paper)
         else:
-            blocks = _blocks(clouds, model, resolution, vertical, learn, seed, bars)
+            blocks = _blocks(clouds, model, resolution, up, learn, seed, bars)
             semantic_map = GPSemanticMap(classes, blocks, free=free, forgetting=forgetting)
+        semantic_map.up = up
         if one_file:
             fill(semantic_map, clouds, bars)
     if not one_file:
-        MapStore(out).create(Settings(classes, blocks, free, forgetting), BUILDING)
+        MapStore(out).create(Settings(classes, blocks, free, forgetting, up=up), BUILDING)
         update_store(out, clouds, executor, workers, address, done=0)
         _drop_steps(out)
         return
@@ -159,10 +162,10 @@ def build(
 
 
 def _blocks(
-    clouds: Scans, model: str, resolution: float | None, vertical: Axis, learn: bool, seed: int, bars: Progress
+    clouds: Scans, model: str, resolution: float | None, up: Up, learn: bool, seed: int, bars: Progress
 ) -> BlockModel:
     """The model of blocks, learned where it is to be."""
-    blocks = block_model(model, resolution, vertical)
+    blocks = block_model(model, resolution, up)
     if not learn or model not in PRESETS:
         return blocks
     labelled = [cloud for cloud in at_most(clouds, *SAMPLE) if cloud.labelled.any()]
@@ -175,7 +178,7 @@ def _blocks(
             stacklevel=2,
         )
         return blocks
-    return learn_blocks(labelled, blocks, vertical, seed, bars)
+    return learn_blocks(labelled, blocks, up, seed, bars)
 
 
 def _drop_steps(out: Path) -> None:

@@ -16,6 +16,7 @@ from semgp.errors import InputError
 from semgp.logs.scans import LogScans
 from semgp.readers import Scans, open_scans
 from semgp.segmentation import labelled_scans, segmenter_of
+from semgp.upward import Up
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,9 @@ class Inputs:
 
 AnyInputs = Annotated[Inputs, Parameter(name="*", group="Scans")]
 """The type of a command's parameter `inputs`: its options stand beside the command's own."""
+
+Upward = Annotated[Up | None, Parameter(allow_leading_hyphen=True)]
+"""The type of options `--up`."""
 
 PLAIN = Inputs()
 """Every scan, as its file says."""

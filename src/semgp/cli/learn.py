@@ -6,7 +6,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from rich.progress import Progress
@@ -14,15 +13,15 @@ from rich.progress import Progress
 from semgp.blocks.learning import learn_from_scans
 from semgp.blocks.model import BlockModel
 from semgp.cli.console import progress, report
-from semgp.cli.inputs import PLAIN, AnyInputs, at_most, sources
+from semgp.cli.inputs import PLAIN, AnyInputs, Upward, at_most, sources
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
 from semgp.gp.model import GPModel
 from semgp.maps.learning import learn_model
 from semgp.maps.presets import PRESETS, with_vertical
+from semgp.upward import Up, vertical
 from semgp.writers import atomic_write
 
-Axis = Literal["x", "y", "z"]
 PAPER = "paper"
 """The name of the whole-scan GP among the models."""
 
@@ -41,7 +40,7 @@ def learn(
     inputs: AnyInputs = PLAIN,
     model: str = "outdoor-lidar",
     resolution: float | None = None,
-    vertical: Axis = "z",
+    up: Upward = None,
     seed: int = 0,
 ) -> None:
     """Learn a block model from a sequence of labelled scans, and write it as JSON for "semgp build --model".
@@ -60,15 +59,15 @@ def learn(
         Where to begin: general, indoor-rgbd, indoor-labels, outdoor-lidar, or a model file.
     resolution
         Edge in metres of the voxels in which labels are added up, instead of the model's.
-    vertical
-        The axis of gravity in the scans' world.
+    up
+        The axis of the scans' world that points upwards; left out, what the scans say, as for "semgp build".
     seed
         Seed of every random draw.
     """
     clouds = sources(scans, inputs)
     with progress() as bars:
-        start = block_model(model, resolution, vertical)
-        learned = learn_blocks(at_most(clouds, *SAMPLE), start, vertical, seed, bars)
+        up = up or clouds[0].up
+        learned = learn_blocks(at_most(clouds, *SAMPLE), block_model(model, resolution, up), up, seed, bars)
     with atomic_write(out) as temporary:
         temporary.write_text(json.dumps(learned.to_json(), indent=2) + "\n")
     report(
@@ -78,10 +77,10 @@ def learn(
     )
 
 
-def block_model(name: str, resolution: float | None, vertical: Axis) -> BlockModel:
-    """Return a preset turned to the world's vertical, or the model in a file as it is."""
+def block_model(name: str, resolution: float | None, up: Up) -> BlockModel:
+    """Return a preset turned to the world's vertical axis, or the model in a file as it is."""
     if name in PRESETS:
-        model = with_vertical(PRESETS[name], "xyz".index(vertical))
+        model = with_vertical(PRESETS[name], vertical(up))
     elif name.endswith(".json"):
         path = Path(name)
         try:
@@ -96,7 +95,7 @@ def block_model(name: str, resolution: float | None, vertical: Axis) -> BlockMod
 
 
 def learn_blocks(
-    sources: Sequence[LabelledCloud], model: BlockModel, vertical: Axis, seed: int, bars: Progress
+    sources: Sequence[LabelledCloud], model: BlockModel, up: Up, seed: int, bars: Progress
 ) -> BlockModel:
     """Return a model learned from scans, with progress.
 
@@ -116,7 +115,7 @@ def learn_blocks(
     def show(n: int, loss: float) -> None:
         bars.update(bar, description=f"learning the model: {n} evaluations, log-loss {loss:.4f}")
 
-    return learn_from_scans(sources, model, vertical="xyz".index(vertical), seed=seed, progress=show)[0]
+    return learn_from_scans(sources, model, vertical=vertical(up), seed=seed, progress=show)[0]
 
 
 def overlap(clouds: Sequence[LabelledCloud], resolution: float) -> float:

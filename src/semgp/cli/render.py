@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from semgp.cli.inputs import PLAIN, AnyInputs, sources
+from semgp.cli.inputs import PLAIN, AnyInputs, Upward, sources
 from semgp.errors import InputError
 
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
-Upward = Annotated[Literal["x", "y", "z", "-x", "-y", "-z"], Parameter(allow_leading_hyphen=True)]
 
 
 def render(
@@ -24,7 +23,7 @@ def render(
     inputs: AnyInputs = PLAIN,
     resolution: float | None = None,
     size: tuple[int, int] = (1200, 800),
-    up: Upward = "z",
+    up: Upward = None,
     azimuth: float | None = None,
     elevation: float = 35.0,
     zoom: float = 1.0,
@@ -63,7 +62,7 @@ def render(
     size
         Width and height of each picture in pixels.
     up
-        The axis of the map that points upwards; -y for maps in a camera's frame, as RGB-D recordings make them.
+        The axis of the map that points upwards; left out, what the map says.
     azimuth
         The side that the eye is on, in degrees about the upward axis: with z up, 0 is +x and 90 is +y. Left out,
         that from which most is seen.
@@ -92,22 +91,24 @@ def render(
     from semgp.maps.batches import query_in_batches
     from semgp.maps.files import load_map
     from semgp.picture.animation import require_animation, save_animation
-    from semgp.picture.camera import TOP, Camera, below, direction
+    from semgp.picture.camera import TOP, Camera, below
     from semgp.picture.coverage import picture_resolution, surface_points
     from semgp.picture.image import Picture, require_png, save_png
     from semgp.picture.paint import require_colours
     from semgp.picture.portrait import cloud_layers, map_layers, portrait
     from semgp.picture.splat import DARK, WHITE
     from semgp.picture.view import View
+    from semgp.upward import direction
 
     (require_animation if orbit else require_png)(out)
     if not all(16 <= pixels <= 16_384 for pixels in size):
         raise InputError(f"a picture has 16 to 16,384 pixels along each side, not {size[0]} x {size[1]}.")
-    upward, ground = direction(up), DARK if dark else WHITE
-    camera = Camera(azimuth, TOP if top else elevation, zoom, upward)
+    ground = DARK if dark else WHITE
     names = [name.strip() for name in by.split(",")]
     with progress() as bars:
         semantic_map = load_map(map_file)
+        upward = direction(up or semantic_map.up)
+        camera = Camera(azimuth, TOP if top else elevation, zoom, upward)
         require_colours(semantic_map.classes, [name for name in names if name != "rgb"])
         positions = below(semantic_map.positions, cut, upward)
         edge = picture_resolution(positions, max(size)) if resolution is None else resolution

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, cast
 from cyclopts import Parameter
 
 from semgp.cli.console import progress, report
-from semgp.cli.inputs import PLAIN, AnyInputs, sources
-from semgp.cli.render import Upward
+from semgp.cli.inputs import PLAIN, AnyInputs, Upward, sources
 from semgp.errors import InputError
 from semgp.maps.files import load_map
-from semgp.maps.presets import PRESETS
+from semgp.maps.presets import PRESETS, with_vertical
+from semgp.upward import Up, vertical
 
 if TYPE_CHECKING:
     from semgp.cloud import LabelledCloud
@@ -36,7 +36,7 @@ def view(
     by: str = "class",
     hide: list[str] | None = None,
     resolution: float | None = None,
-    up: Upward = "z",
+    up: Upward = None,
     title: str | None = None,
     cloud: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
     octomap: Path | None = None,
@@ -73,7 +73,7 @@ def view(
     resolution
         Metres between the points that the map is asked at; left out, as its data are. The viewer changes it.
     up
-        The axis of the map that points upwards; -y for maps in a camera's frame, as RGB-D recordings make them.
+        The axis of the map that points upwards; left out, what the map says.
     title
         Heading; left out, the name of the map.
     cloud
@@ -107,7 +107,7 @@ def view(
 
     with progress() as bars:
         bars.add_task("asking the map", total=None)
-        source = _playback(what, inputs, model) if play else load_map(what[0])
+        source = _playback(what, inputs, model, up) if play else load_map(what[0])
         viewer = LiveViewer(
             source,
             title=name,
@@ -137,7 +137,7 @@ def _write(
     by: str,
     hide: Sequence[str],
     resolution: float | None,
-    up: str,
+    up: Up | None,
 ) -> None:
     from semgp.viewer.page import write_page
 
@@ -186,7 +186,7 @@ def _mesh(source: SemanticMap | Playback) -> Mesh:
     return surface(cast("SpatialMap", source), resolution=Surface(source.positions).spacing)
 
 
-def _playback(scans: list[Path], inputs: AnyInputs, model: str) -> Playback:
+def _playback(scans: list[Path], inputs: AnyInputs, model: str, up: Up | None) -> Playback:
     from semgp.maps.gp import GPSemanticMap
     from semgp.viewer.playback import Playback
 
@@ -194,4 +194,10 @@ def _playback(scans: list[Path], inputs: AnyInputs, model: str) -> Playback:
         raise InputError(f"--model must be one of {', '.join(PRESETS)}, not {model!r}.")
     clouds = sources(scans, inputs)
     classes = clouds[0].classes
-    return Playback(clouds, lambda: GPSemanticMap(classes, PRESETS[model]))
+
+    def begin() -> GPSemanticMap:
+        made = GPSemanticMap(classes, with_vertical(PRESETS[model], vertical(up or clouds[0].up)))
+        made.up = up or clouds[0].up
+        return made
+
+    return Playback(clouds, begin)

@@ -15,6 +15,7 @@ from semgp.maps.protocol import SemanticMap, SerialisableMap
 from semgp.readers.npz import read_arrays
 from semgp.store import StoredMap
 from semgp.store.bucket import as_url
+from semgp.upward import vertical
 from semgp.writers import atomic_write
 
 FORMAT = "semgp-map"
@@ -43,6 +44,7 @@ def save_map(semantic_map: SerialisableMap, path: str | Path) -> None:
         "version": VERSION,
         "kind": semantic_map.kind,
         "classes": {"names": classes.names, "colours": classes.colours},
+        "up": semantic_map.up,
         "map": header,
     }
     text = np.frombuffer(json.dumps(described).encode(), dtype=np.uint8)
@@ -84,7 +86,10 @@ def load_map(path: str | Path) -> SemanticMap:
         plain = described["classes"]
         classes = Classes(tuple(plain["names"]), tuple(tuple(colour) for colour in plain["colours"]))
         parts = {name.removeprefix("map."): a for name, a in arrays.items() if name.startswith("map.")}
-        return MAP_KINDS[described["kind"]].from_arrays(classes, described["map"], parts)
+        made = MAP_KINDS[described["kind"]].from_arrays(classes, described["map"], parts)
+        made.up = described.get("up", "z")
+        vertical(made.up)
+        return made
     except FileFormatError:
         raise
     except (InputError, ValueError, KeyError, TypeError, IndexError, AttributeError) as error:

@@ -80,7 +80,9 @@ def fuse(
     if model.posterior in EXPERTS and "spread" in arrays:
         raise InputError(f"blocks of {model.posterior} experts take positions as certain, the maps' are not.")
     header = {"model": model.to_json(), "free": None if free is None else free.to_json(), "forgetting": None}
-    return GPSemanticMap.from_arrays(a.classes, {"blocks": True, **header}, arrays)
+    fused = GPSemanticMap.from_arrays(a.classes, {"blocks": True, **header}, arrays)
+    fused.up = a.up
+    return fused
 
 
 def require_same_classes(a: Classes, b: Classes) -> None:

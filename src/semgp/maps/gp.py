@@ -23,6 +23,7 @@ from semgp.maps.protocol import NO_FREE_SPACE, query_points, require_classes
 from semgp.maps.settings import require_data
 from semgp.maps.whole import WholeScan
 from semgp.prediction import OccupancyPrediction, Prediction
+from semgp.upward import Up
 
 
 class GPSemanticMap:
@@ -59,6 +60,7 @@ class GPSemanticMap:
     """
 
     kind = "gp"
+    up: Up = "z"
 
     def __init__(
         self,
@@ -136,6 +138,7 @@ class GPSemanticMap:
         a, b = box(low, high)
         part = GPSemanticMap(self.classes, self.model)
         part._state = self._state.crop(lambda X: np.asarray(((a <= X) & (b > X)).all(axis=1)))
+        part.up = self.up
         return part
 
     @property

@@ -12,6 +12,7 @@ from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.prediction import OccupancyPrediction, Prediction
+from semgp.upward import Up
 
 
 @runtime_checkable
@@ -22,6 +23,11 @@ class SemanticMap(Protocol):
     """Name of the method in map files and on the command line, such as "gp" or "knn"."""
 
     classes: Classes
+
+    @property
+    def up(self) -> Up:
+        """The axis of the world that points upwards, see `semgp.upward`: for pictures, no answer depends on it."""
+        ...
 
     def update(self, cloud: LabelledCloud) -> None:
         """Take in a cloud, once for every scan. Never changes the map's settings."""
@@ -48,6 +54,9 @@ class SemanticMap(Protocol):
 @runtime_checkable
 class SerialisableMap(SemanticMap, Protocol):
     """A semantic map that is plain arrays: what map files hold."""
+
+    up: Up
+    """As in `SemanticMap`: "z" unless it is set, to that of the clouds."""
 
     def to_arrays(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Return a header ready for JSON and plain arrays from which `from_arrays` makes the same map."""

@@ -24,6 +24,7 @@ from semgp.octomap.reading import read_tree
 from semgp.octomap.sensor import SensorModel, log_odds
 from semgp.octomap.tree import Leaves, cells_at, joined, prune
 from semgp.prediction import OccupancyPrediction, Prediction
+from semgp.upward import Up
 
 
 class SemanticOctoMap(OccupancyMap):
@@ -49,6 +50,7 @@ class SemanticOctoMap(OccupancyMap):
     """
 
     kind = "octomap"
+    up: Up = "z"
 
     def __init__(
         self,

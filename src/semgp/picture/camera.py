@@ -143,13 +143,6 @@ class Camera:
         return flat._axes(0.0)[0], flat._axes(90.0)[0]
 
 
-def direction(name: str) -> F64:
-    """Return the unit vector (3,) along an axis, such as "z" or "-y"."""
-    axis = np.zeros(3)
-    axis["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
-    return axis
-
-
 def below_mask(points: F64, cut: float | None, up: ArrayLike) -> NDArray[np.bool_]:
     """Return which points (N, 3) lie no higher than `cut` metres along the unit vector `up`; all without a cut."""
     return np.ones(len(points), dtype=bool) if cut is None else np.asarray(points @ np.asarray(up) <= cut)

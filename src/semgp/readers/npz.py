@@ -18,6 +18,7 @@ The arrays of a file; all but `points` may be left out:
 `stamp`           () float        when the cloud was taken, seconds
 `pixels`          (N, 2) integer  row and column in the image
 `image_shape`     (2,) integer    rows and columns of the image
+`up`              () text         axis of the world that points upwards: `z`, `-y`
 ================= =============== ===================================================
 
 Other arrays are ignored. Nothing in a file is ever unpickled. `semgp.writers.write_npz` writes the layout.
@@ -34,7 +35,7 @@ import zipfile
 import zlib
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.lib import format as npy
@@ -44,11 +45,13 @@ from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
 from semgp.readers.fields import numbered_classes
+from semgp.upward import Up
 
 KINDS = {
     **{"points": "fiu", "labels": "iu", "weights": "fiu", "names": "U", "palette": "u", "colours": "u"},
     **{"confidence": "fiu", "covariances": "fiu", "pose_covariance": "fiu", "stamp": "fiu"},
     **{"features": "fiu", "feature_names": "U", "T_world_sensor": "fiu", "pixels": "iu", "image_shape": "iu"},
+    "up": "U",
 }
 """Kinds of numpy type that each array of the layout may have."""
 
@@ -170,6 +173,8 @@ def _cloud(arrays: dict[str, NDArray[Any]], classes: Classes) -> LabelledCloud:
         raise InputError("image_shape must be two numbers, rows and columns.")
     if (stamp := arrays.get("stamp")) is not None and stamp.shape != ():
         raise InputError("stamp must be one number, the time in seconds.")
+    if (up := arrays.get("up", np.array("z"))).shape != ():
+        raise InputError("up must be one axis, such as z or -y.")
     return LabelledCloud(
         points=arrays["points"],
         classes=classes,
@@ -185,4 +190,5 @@ def _cloud(arrays: dict[str, NDArray[Any]], classes: Classes) -> LabelledCloud:
         stamp=None if stamp is None else float(stamp),
         pixels=arrays.get("pixels"),
         image_shape=None if image_shape is None else (image_shape[0], image_shape[1]),
+        up=cast("Up", up.item()),
     )

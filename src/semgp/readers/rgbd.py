@@ -21,6 +21,7 @@ from semgp.errors import FileFormatError, InputError
 from semgp.readers.images import read_colour_image, read_depth
 from semgp.readers.label_folder import LabelFolder
 from semgp.readers.protocol import Scans
+from semgp.upward import up_of_cameras
 
 MOST_PIXELS = 80_000
 """Where no stride is given, the smallest that leaves at most so many pixels of a depth image."""
@@ -76,7 +77,8 @@ class RGBDSequence:
     """The frames of a recording as labelled clouds, each read when it is asked for.
 
     A cloud has the points of every stride-th row and column of the depth image, with colours, `pixels` and
-    `image_shape` of the colour image, `T_world_sensor` and, where the layout has it, `stamp`.
+    `image_shape` of the colour image, `T_world_sensor` and, where the layout has it, `stamp`. Its `up` is what the
+    cameras of all frames hold upwards on average: the world of many recordings is the first camera's frame.
 
     Frames whose pose is not finite, which is how trackers say that they were lost, are left out; a
     `SkippedFramesWarning` says how many, and `skipped` which.
@@ -137,6 +139,7 @@ class RGBDSequence:
         self.max_depth, self.stride, self.soft = max_depth, stride, soft
         self.classes = classes or Classes.numbered(1)
         self.labels = _label_folder(self.path, labels, classes)
+        self.up = up_of_cameras([T for T in (frame.T_world_sensor for frame in self.frames) if T is not None])
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -169,6 +172,7 @@ class RGBDSequence:
             stamp=frame.stamp,
             pixels=pixels,
             image_shape=(rows, columns),
+            up=self.up,
         )
         return cloud if self.labels is None else self.labels.labelled(cloud, frame.colour.stem, soft=self.soft)
 

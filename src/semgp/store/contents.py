@@ -28,7 +28,9 @@ def in_memory(
         state.begin(origin, clock)
         for _, arrays in parts:
             take_in(state, origin, arrays)
-    return GPSemanticMap.of_state(state)
+    made = GPSemanticMap.of_state(state)
+    made.up = settings.up
+    return made
 
 
 def labelled_positions(settings: Settings, arrays: Arrays, origin: I64) -> F64:

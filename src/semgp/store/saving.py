@@ -36,7 +36,8 @@ def save(semantic_map: GPSemanticMap, store: MapStore | str | Path, *, cells: in
     if state is None:
         raise InputError("the paper's map of one training set has no tiles: save it to a .semgp file.")
     store = store if isinstance(store, MapStore) else MapStore(store)
-    settings = Settings(semantic_map.classes, state.model, state.free, state.forgetting, Tiling(cells))
+    tiling, up = Tiling(cells), semantic_map.up
+    settings = Settings(semantic_map.classes, state.model, state.free, state.forgetting, tiling, up)
     with store.writing():
         store.require_empty()
         keys = every_tile(state, settings.tiling)

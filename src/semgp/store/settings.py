@@ -12,6 +12,7 @@ from semgp.maps.blocks import ManyBlocks
 from semgp.maps.forgetting import Forgetting
 from semgp.maps.free_space import FreeSpace
 from semgp.maps.tiles import Tiling
+from semgp.upward import Up, vertical
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Settings:
         Where the map forgets.
     tiling : Tiling, optional
         How cells make tiles.
+    up : str, optional
+        The axis of the world that points upwards, see `semgp.upward`.
 
     Raises
     ------
@@ -42,9 +45,11 @@ class Settings:
     free: FreeSpace | None = None
     forgetting: Forgetting | None = None
     tiling: Tiling = field(default_factory=Tiling)
+    up: Up = "z"
 
     def __post_init__(self) -> None:
         self.new_state()
+        vertical(self.up)
 
     @property
     def resolution(self) -> float:
@@ -69,6 +74,7 @@ class Settings:
             "free": None if self.free is None else self.free.to_json(),
             "forgetting": None if self.forgetting is None else self.forgetting.to_json(),
             "tile_cells": self.tiling.cells,
+            "up": self.up,
         }
 
     @classmethod
@@ -81,4 +87,5 @@ class Settings:
             None if free is None else FreeSpace.from_json(free),
             None if forgetting is None else Forgetting.from_json(forgetting),
             Tiling(plain["tile_cells"]),
+            plain.get("up", "z"),
         )

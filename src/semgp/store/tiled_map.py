@@ -23,6 +23,7 @@ from semgp.store.contents import in_memory, labelled_positions, space_positions
 from semgp.store.groups import groups, in_order, occupancy_in_order
 from semgp.store.settings import Settings
 from semgp.store.working_set import WorkingSet
+from semgp.upward import Up
 
 P = TypeVar("P")
 
@@ -55,6 +56,11 @@ class TiledMap:
     def free(self) -> FreeSpace | None:
         """How free space is kept, None where it is not."""
         return self.settings.free
+
+    @property
+    def up(self) -> Up:
+        """The axis of the world that points upwards."""
+        return self.settings.up
 
     @property
     def resolution(self) -> float:

@@ -17,11 +17,11 @@ from semgp.maps.protocol import SemanticMap
 from semgp.maps.settings import require_positive
 from semgp.picture.view import view_of
 from semgp.surfaces.mesh import Mesh
+from semgp.upward import Up, direction
 from semgp.viewer import cards
 from semgp.viewer.controls import Controls, PlayControls, dress
 from semgp.viewer.fields import CLASS, field_called, field_names
 from semgp.viewer.layers import Layer
-from semgp.viewer.page import UP
 from semgp.viewer.playback import Playback
 from semgp.viewer.scene import MAP, Scene, start_server, stop_server
 from semgp.viewer.state import Progress, Sample, Shown, ViewState, pick, show, take_sample
@@ -54,8 +54,8 @@ class LiveViewer:
         What the points are coloured by at first, see `semgp.viewer.fields`.
     hide : iterable of str
         Classes that are off at first.
-    up : str
-        Upward direction of the world: one of `semgp.viewer.page.UP`.
+    up : str, optional
+        The axis of the world that points upwards, see `semgp.upward`; left out, what the map says.
     most : int
         The most points that are shown at once.
     layers : sequence of Layer
@@ -81,18 +81,16 @@ class LiveViewer:
         resolution: float | None = None,
         field: str = CLASS,
         hide: Iterable[str] = (),
-        up: str = "z",
+        up: Up | None = None,
         most: int = MOST_POINTS,
         layers: Sequence[Layer] = (),
         mesh: Mesh | None = None,
     ) -> None:
-        if up not in UP:
-            raise InputError(f"up is one of {', '.join(UP)}, not {up!r}.")
         if most < 1:
             raise InputError(f"a viewer shows at least one point, not {most}.")
         self._playback = source if isinstance(source, Playback) else None
         self._map = source.begin() if isinstance(source, Playback) else source
-        self._surface = Surface(self._map.positions)
+        self._surface, upward = Surface(self._map.positions), direction(up or self._map.up)
         probe = self._map.query(self._surface.positions[:1])
         spacing, breadth = self._surface.spacing, float(np.linalg.norm(self._surface.high - self._surface.low))
         self.state = ViewState(
@@ -108,8 +106,8 @@ class LiveViewer:
         dress(self._server.gui, dark=False)
         self._server.gui.set_panel_label(title)
         self._worker = Latest(self._work, self._failed)
-        self._scene = Scene(self._server, np.round(self._surface.positions.mean(axis=0)), UP[up], layers, mesh)
-        self._scene.look(view_of(self._surface.positions, up=UP[up]), breadth)
+        self._scene = Scene(self._server, np.round(self._surface.positions.mean(axis=0)), upward, layers, mesh)
+        self._scene.look(view_of(self._surface.positions, up=upward), breadth)
         self._server.scene.on_click()(self._click)
         beside = [name for name in self._scene.names if name != MAP]
         self.state = replace(self.state, off=frozenset(beside))

@@ -19,6 +19,7 @@ from semgp.maps.protocol import SemanticMap
 from semgp.picture.colour import COLOUR_MAPS, GREY, by_value
 from semgp.picture.view import view_of
 from semgp.prediction import Prediction
+from semgp.upward import Up, direction
 from semgp.viewer.fields import CLASS, field_called, field_names, field_scale
 from semgp.viewer.pack import bytes_per_point, packed
 from semgp.viewer.state import Progress, Sample
@@ -31,9 +32,6 @@ MOST_BYTES = 8_000_000
 LEVELS = 3
 """Resolutions in a page, each half as fine as the one before."""
 
-UP = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
-"""Upward directions of the world by name."""
-
 _HEADER_BYTES = 100_000
 """Room in the budget for the program and the classes."""
 
@@ -45,7 +43,7 @@ def page(
     resolution: float | None = None,
     field: str = CLASS,
     hide: Iterable[str] = (),
-    up: str = "z",
+    up: Up | None = None,
     most_bytes: int = MOST_BYTES,
     progress: Progress | None = None,
 ) -> str:
@@ -67,8 +65,8 @@ def page(
         What the points are coloured by at first, see `semgp.viewer.fields`.
     hide : iterable of str
         Classes that are off at first, such as a ceiling.
-    up : str
-        Upward direction of the world: one of `UP`.
+    up : str, optional
+        The axis of the world that points upwards, see `semgp.upward`; left out, what the map says.
     most_bytes : int
         The page is not larger.
     progress : callable, optional
@@ -79,15 +77,14 @@ def page(
     InputError
         An empty map, a class or field that it does not have, or a resolution that does not fit the size.
     """
-    if up not in UP:
-        raise InputError(f"up is one of {', '.join(UP)}, not {up!r}.")
+    upward = direction(up or semantic_map.up)
     surface = Surface.of(semantic_map)
     probe = semantic_map.query(surface.positions[:1])
     field = field_called(probe, field)
     hidden = [semantic_map.classes.index(name) for name in hide]
     room = (most_bytes - _HEADER_BYTES) * 3 // 4 // bytes_per_point(probe)
     samples = _ask_all(semantic_map, surface, _levels(surface, resolution, room), progress)
-    view = view_of(samples[0].points, up=UP[up])
+    view = view_of(samples[0].points, up=upward)
     finest = samples[0].prediction
     described = {
         "title": title,
@@ -99,7 +96,7 @@ def page(
         },
         "state": {"field": field, "hidden": hidden},
         "oriented": surface.oriented,
-        "up": UP[up],
+        "up": upward.tolist(),
         "eye": view.T_world_camera[:3, 3].tolist(),
         "forward": view.T_world_camera[:3, 2].tolist(),
         "fov": view.fov,

@@ -48,7 +48,7 @@ class Scene:
         self,
         server: viser.ViserServer,
         offset: NDArray[np.float64],
-        up: tuple[int, int, int],
+        up: NDArray[np.float64],
         layers: Sequence[Layer] = (),
         mesh: Mesh | None = None,
     ) -> None:

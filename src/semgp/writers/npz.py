@@ -45,6 +45,7 @@ def write_npz(path: str | Path, cloud: LabelledCloud, **arrays: ArrayLike) -> No
         "stamp": cloud.stamp,
         "pixels": cloud.pixels,
         "image_shape": cloud.image_shape,
+        "up": cloud.up,
     }
     further = {name: np.asarray(a) for name, a in arrays.items()}
     if taken := sorted(parts.keys() & further.keys()):

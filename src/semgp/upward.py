@@ -1,0 +1,57 @@
+"""Which way is up: the axis of a world that points upwards, by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, TypeAlias, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgp.errors import InputError
+
+Up: TypeAlias = Literal["x", "y", "z", "-x", "-y", "-z"]
+"""An axis and its sign: "z" in ROS REP-103 and in most maps, "-y" in a world that is a camera's optical frame."""
+
+F64 = NDArray[np.float64]
+
+
+def direction(up: str) -> F64:
+    """Return the upward direction (3,), of length one.
+
+    Raises
+    ------
+    InputError
+        What names no axis.
+    """
+    axis = np.zeros(3)
+    axis[vertical(up)] = -1.0 if up.startswith("-") else 1.0
+    return axis
+
+
+def vertical(up: str) -> int:
+    """Return the axis of gravity: 0, 1 or 2 for x, y or z.
+
+    Raises
+    ------
+    InputError
+        What names no axis.
+    """
+    if up not in get_args(Up):
+        raise InputError(f"up is one of {', '.join(get_args(Up))}, not {up!r}.")
+    return "xyz".index(up[-1])
+
+
+def up_of_cameras(poses: Sequence[F64]) -> Up:
+    """Return the axis nearest to what the cameras of a recording hold upwards on average.
+
+    People and robots hold cameras upright: the y axis of their optical frames points down.
+
+    Parameters
+    ----------
+    poses : sequence of (4, 4) arrays
+        At least one `T_world_sensor` of an optical frame (x right, y down, z forward).
+    """
+    upward = -np.mean([T[:3, 1] for T in poses], axis=0)
+    axis = int(np.abs(upward).argmax())
+    return cast("Up", ("-" if upward[axis] < 0 else "") + "xyz"[axis])
