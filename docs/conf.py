@@ -3,11 +3,13 @@
 import os
 import re
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import semgp
 
 HERE = Path(__file__).resolve().parent
+MATHJAX = files("sphinx-mathjax-offline") / "static" / "mathjax" / "tex-svg.js"
 TRAILING = re.compile(r"(?<![`\w])(\w*[A-Za-z0-9])_(?=[^\w])")
 
 project = "semgp"
@@ -19,7 +21,8 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx
 exclude_patterns = ["_build", "**/.*"]
 html_theme = "furo"
 html_title = "semgp"
-html_static_path = ["_static"]
+html_static_path = ["_static", str(MATHJAX)]
+mathjax_path = MATHJAX.name  # formulas without a network, and without asking anybody for them
 html_css_files = ["semgp.css"]
 html_theme_options = {"light_css_variables": {"color-brand-primary": "#2a6f97", "color-brand-content": "#2a6f97"}}
 
