@@ -10,7 +10,7 @@ import pytest
 from semgp.camera import Pinhole, cloud_from_depth
 from semgp.errors import FileFormatError, InputError
 from semgp.readers import open_scans
-from semgp.readers.rgbd import SkippedFramesWarning
+from semgp.readers.recording import SkippedFramesWarning
 from tests.rgbd_samples import (
     CLASSES,
     SHAPE,

@@ -6,7 +6,6 @@ The layouts of folders are told apart and read in `semgp.readers.rgbd_layouts`.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,56 +20,11 @@ from semgp.errors import FileFormatError, InputError
 from semgp.readers.images import read_colour_image, read_depth
 from semgp.readers.label_folder import LabelFolder
 from semgp.readers.protocol import Scans
+from semgp.readers.recording import Frame, Recording, with_poses
 from semgp.upward import up_of_cameras
 
 MOST_PIXELS = 80_000
 """Where no stride is given, the smallest that leaves at most so many pixels of a depth image."""
-
-
-class SkippedFramesWarning(UserWarning):
-    """Frames of a recording are left out because nobody knows where they were taken."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One frame of a recording, not yet read.
-
-    Parameters
-    ----------
-    colour, depth : Path
-        Its images.
-    T_world_sensor : (4, 4) array, optional
-        Pose of the camera's optical frame; None where tracking was lost.
-    stamp : float, optional
-        When it was taken, seconds.
-    """
-
-    colour: Path
-    depth: Path
-    T_world_sensor: NDArray[np.float64] | None
-    stamp: float | None = None
-
-
-@dataclass(frozen=True)
-class Recording:
-    """What a folder of some layout holds.
-
-    Parameters
-    ----------
-    frames : tuple of Frame
-        All frames in order, those without a pose, too.
-    camera : Pinhole
-        Intrinsics of the depth images.
-    colour_camera : Pinhole, optional
-        Intrinsics of the colour images, where those are not registered to the depth pixel by pixel.
-    units_per_metre : float
-        What a depth image counts.
-    """
-
-    frames: tuple[Frame, ...]
-    camera: Pinhole
-    colour_camera: Pinhole | None = None
-    units_per_metre: float = 1000.0
 
 
 class RGBDSequence:
@@ -132,7 +86,7 @@ class RGBDSequence:
         if stride is not None and (not isinstance(stride, int) or stride < 1):
             raise InputError(f"stride must be a whole number of pixels from 1 on, not {stride!r}.")
         self.path = Path(path)
-        self.frames, self.skipped = _with_poses(self.path, recording.frames)
+        self.frames, self.skipped = with_poses(self.path, recording.frames)
         self.camera = camera or recording.camera
         self.colour_camera = None if camera else recording.colour_camera
         self.units_per_metre = depth_scale or recording.units_per_metre
@@ -239,22 +193,6 @@ class RGBDReader:
             stride=stride,
         )
         return Scans(range(len(sequence)), sequence.scan)
-
-
-def _with_poses(path: Path, frames: tuple[Frame, ...]) -> tuple[tuple[Frame, ...], tuple[str, ...]]:
-    """Return the frames that have a pose, and the names of the others, after a warning."""
-    kept = tuple(frame for frame in frames if frame.T_world_sensor is not None)
-    skipped = tuple(frame.colour.name for frame in frames if frame.T_world_sensor is None)
-    if not kept:
-        raise FileFormatError(path, f"has {len(frames)} frames, none of them with a valid pose.")
-    if skipped:
-        warnings.warn(
-            f"{path}: {len(skipped)} of {len(frames)} frames have no valid pose and are left out, "
-            f"the first of them {skipped[0]}.",
-            SkippedFramesWarning,
-            stacklevel=2,
-        )
-    return kept, skipped
 
 
 def _label_folder(path: Path, labels: str | Path | None, classes: Classes | None) -> LabelFolder | None:

@@ -10,7 +10,8 @@ import numpy as np
 
 from semgp.camera import Pinhole
 from semgp.errors import FileFormatError
-from semgp.readers.rgbd import Frame, Recording, RGBDReader
+from semgp.readers.recording import Frame, Recording
+from semgp.readers.rgbd import RGBDReader
 from semgp.readers.rgbd_text import camera_file, json_camera, json_poses, log_poses, matrix_file, pose_file
 from semgp.readers.rgbd_tum import tum
 

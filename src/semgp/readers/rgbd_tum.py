@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from semgp.camera import Pinhole
 from semgp.errors import FileFormatError
-from semgp.readers.rgbd import Frame, Recording
+from semgp.readers.recording import Frame, Recording
 from semgp.readers.rgbd_text import Pose, camera_file
 from semgp.readers.trajectory import Trajectory, read_tum, text_lines_of
 
