@@ -1,6 +1,6 @@
 """Bags that tests write with rosbags alone, message by message: a robot with a lidar or a camera."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -138,9 +138,22 @@ class RawBag:
         )
         self.write(topic, message, stamp)
 
-    def camera_info(self, frame: str, stamp: float, K: NDArray[np.float64], shape: tuple[int, int]) -> None:
+    def compressed(self, topic: str, frame: str, stamp: float, data: bytes, what: str) -> None:
+        header = self.header(frame, stamp)
+        content = np.frombuffer(data, np.uint8)
+        message = self.make("sensor_msgs/msg/CompressedImage", header=header, format=what, data=content)
+        self.write(topic, message, stamp)
+
+    def camera_info(
+        self,
+        frame: str,
+        stamp: float,
+        K: NDArray[np.float64],
+        shape: tuple[int, int],
+        lens: tuple[str, Sequence[float]] = ("plumb_bob", (0,) * 5),
+    ) -> None:
         P = np.hstack([K, np.zeros((3, 1))])
-        matrices = {"d": np.zeros(5), "k": K.ravel(), "r": np.eye(3).ravel(), "p": P.ravel()}
+        matrices = {"d": np.array(lens[1], np.float64), "k": K.ravel(), "r": np.eye(3).ravel(), "p": P.ravel()}
         if self.ros1:
             matrices = {name.upper(): matrix for name, matrix in matrices.items()}
         roi = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
@@ -149,7 +162,7 @@ class RawBag:
             header=self.header(frame, stamp),
             height=shape[0],
             width=shape[1],
-            distortion_model="plumb_bob",
+            distortion_model=lens[0],
             **matrices,
             binning_x=0,
             binning_y=0,

@@ -8,7 +8,7 @@ import pytest
 
 from semgp.classes import MISSING, Classes
 from semgp.errors import FileFormatError, InputError
-from semgp.logs.images import COLOUR_ENCODINGS, DEPTH_ENCODINGS, LABEL_ENCODINGS, camera_of, pixels_of
+from semgp.logs.pixels import COLOUR_ENCODINGS, DEPTH_ENCODINGS, LABEL_ENCODINGS, pixels_of_image
 from semgp.logs.reader import open_log
 from semgp.scene import DepthCamera, synthetic_room
 from tests.log_samples import RawBag, message, raw_bag
@@ -96,7 +96,7 @@ def test_topics_that_lack_are_asked_for(tmp_path: Path) -> None:
         open_log(tmp_path / "run.mcap", topic="/points", **TOPICS)
     with pytest.raises(InputError, match="topic /camera_info holds sensor_msgs/msg/CameraInfo"):
         open_log(tmp_path / "run.mcap", depth="/depth", labels="/camera_info", camera_info="/camera_info")
-    with pytest.raises(FileFormatError, match="its label image is 'rgb8', not one of mono8"):
+    with pytest.raises(FileFormatError, match="its label image cannot be read: it is 'rgb8', not one of mono8"):
         open_log(tmp_path / "run.mcap", depth="/depth", labels="/colour", camera_info="/camera_info")[0]
 
 
@@ -117,7 +117,7 @@ def test_encodings_of_either_byte_order_with_padded_rows(encoding: str, big: int
         step=len(rows[0]),
         data=np.frombuffer(b"".join(rows), "u1"),
     )
-    found = pixels_of(image, "test", [encoding])
+    found = pixels_of_image(image)
     np.testing.assert_array_equal(found, pixels if channels > 1 else pixels[..., 0])
     assert found.dtype.isnative
     for change, problem in (
@@ -126,16 +126,4 @@ def test_encodings_of_either_byte_order_with_padded_rows(encoding: str, big: int
         ({"width": 0}, "no"),
     ):
         with pytest.raises(InputError, match=problem):
-            pixels_of(message(**vars(image) | change), "test", [encoding])
-
-
-def test_cameras() -> None:
-    roi = message(width=0, height=0)
-    info = message(k=K.ravel(), p=np.zeros(12), binning_x=0, binning_y=0, roi=roi)
-    assert camera_of(info) == PINHOLE
-    P = np.array([200.0, 0, 20, 0, 0, 210, 15, 0, 0, 0, 1, 0])
-    assert camera_of(message(**vars(info) | {"p": P})).fy == 210
-    with pytest.raises(InputError, match="binned or cut-out"):
-        camera_of(message(**vars(info) | {"binning_x": 2}))
-    with pytest.raises(InputError, match="focal lengths"):
-        camera_of(message(**vars(info) | {"k": np.zeros(9)}))
+            pixels_of_image(message(**vars(image) | change))

@@ -1,10 +1,12 @@
 """Which way is up: from the cameras of a recording to clouds, maps, files and stores."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -17,9 +19,13 @@ from semgp.errors import FileFormatError, InputError
 from semgp.maps.files import load_map, save_map
 from semgp.maps.fusion import fuse
 from semgp.maps.gp import GPSemanticMap
+from semgp.octomap import SemanticOctoMap
+from semgp.planning import occupancy_grid
+from semgp.planning.section import section
 from semgp.readers import read
 from semgp.store import MapStore, Settings, StoredMap, fuse_stored, save
-from semgp.upward import Up, direction, up_of_cameras, vertical
+from semgp.surfaces import surface, write_glb
+from semgp.upward import Up, direction, level, up_of_cameras, vertical
 from semgp.writers import write_npz
 from tests.cli.test_commands import run
 from tests.rgbd_samples import pose, write_seven_scenes
@@ -54,6 +60,46 @@ def test_cameras_that_tilt_are_held_upright_on_average(up: Up, tilts: list[float
 def test_names_are_directions(up: Up) -> None:
     assert np.abs(direction(up)).sum() == 1
     assert direction(up)[vertical(up)] == (-1 if up[0] == "-" else 1)
+
+
+@pytest.mark.parametrize("up", AXES)
+def test_a_level_frame_is_the_world_turned(up: Up) -> None:
+    R = level(up)
+    np.testing.assert_array_equal(R @ direction(up), [0, 0, 1])
+    np.testing.assert_array_equal(R @ R.T, np.eye(3))
+    assert np.linalg.det(R) == 1
+
+
+def test_a_level_frame_of_a_camera_is_a_body() -> None:
+    np.testing.assert_array_equal(level("z"), np.eye(3))
+    np.testing.assert_array_equal(level("-y").T @ [1, 0, 0], [0, 0, 1])  # x: forward
+    np.testing.assert_array_equal(level("-y").T @ [0, 1, 0], [-1, 0, 0])  # y: left
+
+
+@pytest.mark.parametrize("up", AXES)
+def test_slices_grids_and_meshes_are_level_in_any_world(up: Up, corner: LabelledCloud, tmp_path: Path) -> None:
+    def mapped(R: np.ndarray) -> SemanticOctoMap:
+        T = np.eye(4)
+        assert corner.T_world_sensor is not None
+        T[:3, :3], T[:3, 3] = R, R @ corner.T_world_sensor[:3, 3]
+        made = SemanticOctoMap(corner.classes, resolution=0.25)
+        made.update(replace(corner, points=(corner.points + 0.0625) @ R.T, T_world_sensor=T))
+        return made
+
+    plain, turned = mapped(np.eye(3)), mapped(level(up).T)
+    turned.up = up
+    box = ((-0.25, -0.25), (2.25, 2.25))
+    cuts = [section(m, 0.8625, *box, resolution=0.25) for m in (plain, turned)]
+    np.testing.assert_array_equal(cuts[1].label, cuts[0].label)
+    assert (cuts[0].label >= 0).any()
+    grids = [occupancy_grid(m, *box, heights=(0.25, 1.0), resolution=0.25) for m in (plain, turned)]
+    np.testing.assert_array_equal(grids[1].data, grids[0].data)
+    assert (grids[0].data > 50).any()
+    bounds = []
+    for m in (plain, turned):
+        write_glb(tmp_path / "a.glb", surface(m, resolution=0.25))
+        bounds.append(trimesh.load(tmp_path / "a.glb").bounds)
+    np.testing.assert_allclose(bounds[1], bounds[0], atol=0.3)
 
 
 @pytest.mark.parametrize("up", ["", "w", "+z", "zz", "--z", "Z"])

@@ -42,6 +42,23 @@ def vertical(up: str) -> int:
     return "xyz".index(up[-1])
 
 
+def level(up: str) -> F64:
+    """Return the rotation (3, 3) from a world to a level frame, whose z points up: the identity for "z".
+
+    The other axes follow in a circle, so that a camera's optical frame ("-y") is turned to the body's frame of
+    ROS REP-103: x forward, y left.
+
+    Raises
+    ------
+    InputError
+        What names no axis.
+    """
+    k = vertical(up)
+    R, sign = np.zeros((3, 3)), direction(up)[k]
+    R[0, (k + 1) % 3], R[1, (k + 2) % 3], R[2, k] = 1.0, sign, sign
+    return R
+
+
 def up_of_cameras(poses: Sequence[F64]) -> Up:
     """Return the axis nearest to what the cameras of a recording hold upwards on average.
 

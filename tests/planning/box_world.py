@@ -13,6 +13,7 @@ from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.prediction import OccupancyPrediction, Prediction
 from semgp.scene.raycast import BOX, Solids
+from semgp.upward import Up
 
 F64 = NDArray[np.float64]
 
@@ -24,6 +25,7 @@ class BoxWorld:
     """
 
     kind = "boxes"
+    up: Up = "z"
 
     def __init__(
         self,

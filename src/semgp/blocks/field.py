@@ -19,7 +19,7 @@ from semgp.blocks.model import CLOSED, EXPERTS, BlockModel
 from semgp.blocks.observations import Observations, require_summable
 from semgp.blocks.pairs import CellTrees, find_pairs, home_blocks, mark_cells
 from semgp.blocks.sites import Sites
-from semgp.blocks.solve import solve_cells
+from semgp.blocks.solve_cells import solve_cells
 from semgp.blocks.solved import Solved
 from semgp.blocks.store import BlockStore, sorted_by
 from semgp.errors import InputError

@@ -74,9 +74,12 @@ def open_log(
     max_gap : float
         Poses are interpolated between samples at most so many seconds apart.
     depth, labels, camera_info : str, optional
-        Instead of point clouds, topics of rectified depth and label images of one camera and its CameraInfo.
+        Instead of point clouds, topics of depth and label images of one camera and its CameraInfo. Images are
+        sensor_msgs/Image or CompressedImage: depth as PNG or by compressedDepth (PNG or RVL), labels as PNG. A
+        topic of depth called `image_raw`, also with /compressed or /compressedDepth after it, holds raw images:
+        the lens's distortion D is undone. Any other holds rectified ones.
     colour : str, optional
-        Topic of the camera's colour images, registered to its depth.
+        Topic of the camera's colour images, registered to its depth; compressed as PNG or JPEG.
     max_depth : float
         Depths beyond it, in metres, are left out.
     stride : int, optional

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgp.octomap.morton import BRICK_BITS
-from semgp.octomap.rays import ONE
+from semgp.octomap.ray_kernels import ONE
 
 
 class Store(NamedTuple):

@@ -17,6 +17,7 @@ from semgp.maps.settings import require_positive
 from semgp.parallel import slices
 from semgp.planning.boxes import box_corners, cells_between, require_few
 from semgp.prediction import OCCUPIED, UNKNOWN
+from semgp.upward import level
 from semgp.writers import atomic_write
 
 LETHAL = 100
@@ -113,7 +114,8 @@ def occupancy_grid(
     Parameters
     ----------
     semantic_map : SpatialMap
-        A map that keeps free space, z upwards; asked at the middle of each cell and height.
+        A map that keeps free space; asked at the middle of each cell and height. Where its world has another axis
+        upwards than z, corners and heights are those of the level frame (`semgp.upward.level`).
     low, high : (2,) arrays
         Corners of the grid, x and y in metres, world frame.
     heights : (float, float)
@@ -135,12 +137,13 @@ def occupancy_grid(
     levels = _levels(heights, edge)
     require_few(float(len(cells)) * len(levels), edge)
     price = _prices(costs or {}, semantic_map.classes)
+    R = level(semantic_map.up)
     data, cost = np.full(len(cells), -1, dtype=np.int8), np.full(len(cells), -1, dtype=np.int8)
     label = np.full(len(cells), MISSING, dtype=np.int32)
     for part in slices(len(cells), BATCH):
         centres = cells.centres(np.arange(part.start, part.stop))[:, ::-1]
-        for level in levels:
-            prediction = semantic_map.query(np.insert(centres, 2, level, axis=1))
+        for height in levels:
+            prediction = semantic_map.query(np.insert(centres, 2, height, axis=1) @ R)
             occupancy = occupancy_of(prediction)
             state = occupancy.state
             percent = np.where(state == UNKNOWN, -1, np.rint(100 * occupancy.probability)).astype(np.int8)

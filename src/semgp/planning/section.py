@@ -20,6 +20,7 @@ from semgp.picture.paint import Bar, paint_labels, paint_values
 from semgp.picture.portrait import with_scale_bar
 from semgp.planning.boxes import box_corners, cells_between
 from semgp.prediction import FREE, UNKNOWN, Prediction
+from semgp.upward import level
 
 _FREE_COLOUR = (240, 236, 222)
 _PIXELS = 700
@@ -99,7 +100,8 @@ def section(
     Parameters
     ----------
     semantic_map : SemanticMap
-        Any map, z upwards.
+        Any map. Where its world has another axis upwards than z, height and corners are those of the level frame
+        (`semgp.upward.level`).
     height : float
         z in metres.
     low, high : (2,) arrays, optional
@@ -117,7 +119,8 @@ def section(
     """
     if not math.isfinite(height):
         raise InputError(f"height is z in metres, not {height}.")
-    mapped = semantic_map.positions[:, :2]
+    R = level(semantic_map.up)
+    mapped = (semantic_map.positions @ R.T)[:, :2]
     if not len(mapped):
         raise InputError("the map is empty: build it from scans with labels.")
     a, b = box_corners(mapped.min(axis=0) if low is None else low, mapped.max(axis=0) if high is None else high, 2)
@@ -127,7 +130,7 @@ def section(
     free, entropy = np.zeros(len(cells), dtype=bool), np.empty(len(cells))
     for part in slices(len(cells), BATCH):
         centres = cells.centres(np.arange(part.start, part.stop))[:, ::-1]
-        answer = semantic_map.query(np.insert(centres, 2, height, axis=1))
+        answer = semantic_map.query(np.insert(centres, 2, height, axis=1) @ R)
         label[part], free[part], entropy[part] = _what_is_there(answer)
         if progress is not None:
             progress(part.stop, len(cells))

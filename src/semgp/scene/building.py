@@ -9,7 +9,6 @@ from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import ndimage
 
 from semgp.checks import require_finite, require_seed, rigid_transform
 from semgp.classes import Classes
@@ -17,7 +16,8 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.scene.floorplan import BUILDING_CLASSES, HEIGHT, LENGTH, MISTAKEN_FOR, WIDTH, FloorPlan, floor_plan
 from semgp.scene.lidar import Lidar, PatchFaults
-from semgp.scene.raycast import BOX, Solids, cast
+from semgp.scene.raycast import Solids, cast
+from semgp.scene.standing import connected, touches
 from semgp.voxels import voxel_keys
 
 ROBOT_HEIGHT, MAST = 1.1, 1.0
@@ -149,10 +149,8 @@ class SyntheticBuilding:
         X = _plan_points(points)
         if not radius >= 0:
             raise InputError(f"a radius must not be negative, but is {radius}.")
-        free = np.asarray(((radius < X) & (self.size[:2] - radius > X)).all(axis=1))
-        for i in _near(self._obstacles, X, radius):
-            free[_touched(X, radius, self._obstacles, i)] = False
-        return free
+        inside = ((radius < X) & (self.size[:2] - radius > X)).all(axis=1)
+        return np.asarray(inside & ~touches(X, radius, self._obstacles))
 
     def reachable(self, radius: float, spacing: float = 0.1) -> NDArray[np.float64]:
         """Return the places of a grid, (N, 2), that a robot of a radius can get to from the entrance, metres.
@@ -169,13 +167,12 @@ class SyntheticBuilding:
         axes = [np.arange(spacing / 2, size, spacing) for size in self.size[:2]]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         free = self.is_free(grid.reshape(-1, 2), radius).reshape(grid.shape[:2])
-        part, _ = ndimage.label(free)
         i, j = (self.entrance / spacing).astype(int)
         if not free[i, j]:
             raise InputError(
                 f"a robot of a radius of {radius} m does not fit at the entrance: take a smaller one."
             )
-        return np.asarray(grid[part == part[i, j]])
+        return np.asarray(grid[connected(free, (i, j))])
 
     def surfaces(self, radius: float, resolution: float = 0.1) -> LabelledCloud:
         """Return the surfaces that the lidar sees from where a robot can get to, with their true labels.
@@ -230,28 +227,6 @@ class SyntheticBuilding:
         low, high = s.centre[:, 2] - s.half[:, 2], s.centre[:, 2] + s.half[:, 2]
         hit = (low < ROBOT_HEIGHT) & (high > _SILL)
         return Solids(s.shape[hit], s.centre[hit], s.half[hit], s.yaw[hit])
-
-
-def _near(solids: Solids, points: NDArray[np.float64], radius: float) -> NDArray[np.intp]:
-    """Return the solids that may be within a radius of some of the points (N, 2), seen from above."""
-    if not len(points):
-        return np.empty(0, dtype=np.intp)
-    reach = radius + np.hypot(*solids.half[:, :2].T)[:, None]
-    centre = solids.centre[:, :2]
-    within = (centre + reach >= points.min(axis=0)) & (centre - reach <= points.max(axis=0))
-    return np.flatnonzero(within.all(axis=1))
-
-
-def _touched(points: NDArray[np.float64], radius: float, solids: Solids, i: int) -> NDArray[np.intp]:
-    """Return which points (N, 2) are within a radius of solid i, seen from above, ellipsoids as discs."""
-    half = solids.half[i, :2]
-    near = np.flatnonzero((np.abs(points - solids.centre[i, :2]) <= radius + np.hypot(*half)).all(axis=1))
-    x, y = (points[near] - solids.centre[i, :2]).T
-    if solids.shape[i] != BOX:
-        return np.asarray(near[np.hypot(x, y) <= radius + half.max()])
-    c, s = np.cos(solids.yaw[i]), np.sin(solids.yaw[i])
-    beside = np.maximum(np.abs(np.stack([c * x + s * y, c * y - s * x])) - half[:, None], 0)
-    return np.asarray(near[np.hypot(*beside) <= radius])
 
 
 def _plan_points(points: ArrayLike) -> NDArray[np.float64]:

@@ -21,9 +21,9 @@ class TFLiteNetwork:
     """A network in a .tflite file.
 
     An output of whole numbers (1, h, w) are labels. Their logits are then read from within the network: from the
-    tensor that `logits` names, or from the one that the arg-max is taken of, the last before the output; and if
-    the network has only enlarged that from the tensor before it (same channels, same quantisation, fewer pixels),
-    from the smaller one. Any other output are scores, quantised or not.
+    tensor that `logits` names, or from the one that the arg-max is taken of, the last of its size before it; and
+    if the network has only enlarged that from the tensor before it (same channels, same quantisation, fewer
+    pixels), from the smaller one. Any other output are scores, quantised or not.
 
     Parameters
     ----------
@@ -113,7 +113,8 @@ def logits_of(
 ) -> tuple[Details | None, Details | None]:
     """Return the logits of a name, or those before an arg-max; and their enlargement, where there is one."""
     if name is None:
-        i = [tensor["index"] for tensor in tensors].index(output) - 1
+        last = [tensor["index"] for tensor in tensors].index(output)
+        i = next((k for k in range(last - 1, -1, -1) if _is_score_image(tensors[k], tensors[last])), -1)
         if i > 0 and _enlarges(tensors[i], tensors[i - 1]):
             i -= 1
     else:
@@ -124,6 +125,11 @@ def logits_of(
         return None, None
     larger = tensors[i + 1 : i + 2]
     return tensors[i], larger[0] if larger and _enlarges(larger[0], tensors[i]) else None
+
+
+def _is_score_image(tensor: Details, labels: Details) -> bool:
+    """Tell whether a tensor may be what the labels (1, h, w) were taken from: (1, h, w, C)."""
+    return len(tensor["shape"]) == 4 and bool((tensor["shape"][:3] == labels["shape"][:3]).all())
 
 
 def _enlarges(large: Details, small: Details) -> bool:

@@ -99,6 +99,7 @@ def surface(
         probability,
         entropy,
         variance[0] if variance else None,
+        semantic_map.up,
     )
 
 

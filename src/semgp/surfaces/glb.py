@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from semgp.errors import InputError, MissingExtraError
 from semgp.surfaces.mesh import Mesh
+from semgp.upward import level
 from semgp.writers import atomic_write
 
 _TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -26,15 +27,15 @@ def write_glb(path: str | Path, mesh: Mesh) -> None:
     Vertices have normals, class colours (`COLOR_0`, linear as glTF asks for) and the attributes `_LABEL` (-1 where
     it is missing), `_PROBABILITY`, `_ENTROPY` and, where the mesh has it, `_VARIANCE`, all of them float32. The
     scene's `extras` name the classes in the order of the labels. Positions are written relative to the middle of
-    the mesh, in single precision; the node's matrix puts them back into the world and turns z upwards into glTF's
-    y upwards.
+    the mesh, in single precision; the node's matrix puts them back into the world and turns its
+    upward axis into glTF's, y.
 
     Parameters
     ----------
     path : str or Path
         The file, replaced where it exists.
     mesh : Mesh
-        The mesh, z upwards.
+        The mesh.
 
     Raises
     ------
@@ -60,8 +61,9 @@ def write_glb(path: str | Path, mesh: Mesh) -> None:
         vertex_attributes={name: values.astype(np.float32) for name, values in attributes.items()},
         process=False,
     )
+    R = _TO_Y_UP @ level(mesh.up)
     to_world = np.eye(4)
-    to_world[:3, :3], to_world[:3, 3] = _TO_Y_UP, _TO_Y_UP @ middle
+    to_world[:3, :3], to_world[:3, 3] = R, R @ middle
     scene = trimesh.Scene(metadata={"classes": list(mesh.classes.names)})
     scene.add_geometry(shape, node_name="map", geom_name="map", transform=to_world)
     content = trimesh.exchange.gltf.export_glb(scene, include_normals=True, tree_postprocessor=_finish)

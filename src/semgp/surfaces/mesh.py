@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from semgp.classes import Classes
 from semgp.errors import InputError
 from semgp.picture.colour import by_class
+from semgp.upward import Up
 
 F64 = NDArray[np.float64]
 
@@ -36,6 +37,8 @@ class Mesh:
         Entropy of the class probabilities, in nats.
     variance : (V,) float array, optional
         Variance of the map's belief about that class, see `Prediction`; None where the map has none.
+    up : str, optional
+        The axis of the world that points upwards, see `semgp.upward`.
 
     Raises
     ------
@@ -51,6 +54,7 @@ class Mesh:
     probability: NDArray[np.floating]
     entropy: NDArray[np.floating]
     variance: NDArray[np.floating] | None = None
+    up: Up = "z"
 
     def __post_init__(self) -> None:
         n = len(self.vertices)
