@@ -1,11 +1,13 @@
 """How the service bears load: clients that ask and clients that update, on the loopback of this machine.
 
-    uv run python benchmarks/service.py [--minutes 0.5] [--clients 4] [--points 100000] [--updates 0.5] [--json]
+    uv run python benchmarks/service.py [--minutes 0.5] [--clients 4] [--points 100000] [--updates 0.5] [--keep 20]
+        [--json]
 
 `semgp serve` is started on a new stored map of a road with 13 classes. Each client asks about a piece of the road
 again and again; one more adds a scan so many times a second, over and over along the whole road. Printed: latency
-at the client (median, 99 %), points a second, memory of the service from beginning to end, errors, versions seen.
-At the end some of the answers are compared, bit for bit, with those of the version that they name, opened anew.
+at the client (median, 99 %), points a second, memory of the service and size of the store from beginning to end,
+errors, versions seen. At the end some of the answers are compared, bit for bit, with those of the version that
+they name, opened anew, where it is still there.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -35,7 +38,7 @@ from semgp.cloud import LabelledCloud
 from semgp.errors import SemgpError
 from semgp.maps.presets import OUTDOOR_LIDAR
 from semgp.service import Client
-from semgp.store import Settings, StoredMap
+from semgp.store import MapStore, Settings, StoredMap
 
 CLASSES = Classes.numbered(13)
 ROAD, WIDTH, PIECE = 200.0, 20.0, 30.0  # metres
@@ -52,6 +55,7 @@ class Seen:
     answers: list[tuple[int, int, str]] = field(default_factory=list)  # version, seed, digest
     errors: list[str] = field(default_factory=list)
     memory: list[float] = field(default_factory=list)  # MB
+    disk: list[float] = field(default_factory=list)  # MB
 
 
 def surface(rng: np.random.Generator, start: float, length: float, n: int) -> F64:
@@ -86,6 +90,7 @@ def main() -> None:
     parser.add_argument("--clients", type=int, default=4)
     parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--updates", type=float, default=0.5, help="a second")
+    parser.add_argument("--keep", type=int, default=20, help="versions that stay, 0 for all")
     parser.add_argument("--json", action="store_true", help="print JSON instead of words")
     options = parser.parse_args()
     if not LEAST <= options.minutes <= MOST:
@@ -114,6 +119,8 @@ def load(store: Path, options: argparse.Namespace) -> tuple[Seen, str]:
         str(store),
         "--port",
         "0",
+        "--keep",
+        str(options.keep),
         "--json",
     ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -124,7 +131,10 @@ def load(store: Path, options: argparse.Namespace) -> tuple[Seen, str]:
     url = json.loads("".join(lines))["url"]
     seen, stop = Seen(), Event()
     end = time.monotonic() + 60 * options.minutes
-    works: list[Callable[[], None]] = [lambda: watch(url, seen, stop), lambda: update(url, seen, stop, options)]
+    works: list[Callable[[], None]] = [
+        lambda: watch(url, store, seen, stop),
+        lambda: update(url, seen, stop, options),
+    ]
     works += [lambda k=k: ask(url, seen, stop, k, options) for k in range(options.clients)]  # type: ignore[misc]
     with ThreadPoolExecutor(len(works)) as pool:
         running = [pool.submit(work) for work in works]
@@ -171,23 +181,35 @@ def update(url: str, seen: Seen, stop: Event, options: argparse.Namespace) -> No
             stop.wait(max(0.0, 1 / options.updates - (time.perf_counter() - start)))
 
 
-def watch(url: str, seen: Seen, stop: Event) -> None:
-    """Write down the memory of the service, every second."""
+def watch(url: str, store: Path, seen: Seen, stop: Event) -> None:
+    """Write down the memory of the service and the size of its store, every second."""
     while not stop.wait(1):
         with urlopen(url + "/metrics", timeout=60) as response:
             lines = response.read().decode().splitlines()
         seen.memory += [float(x.split()[1]) / 1e6 for x in lines if x.startswith("process_resident_memory_bytes ")]
+        seen.disk.append(on_disk(store))
+
+
+def on_disk(store: Path) -> float:
+    """Megabytes of all files of a store, but for those that are removed meanwhile."""
+    total = 0
+    for path in store.rglob("*"):
+        with suppress(FileNotFoundError):
+            total += path.stat().st_size if path.is_file() else 0
+    return total / 1e6
 
 
 def summary(seen: Seen, options: argparse.Namespace, store: Path) -> dict[str, Any]:
     """Return the numbers, and what the spot checks found."""
     t, u = np.array(seen.seconds), np.array(seen.update_seconds)
-    chosen = [seen.answers[i] for i in np.linspace(0, len(seen.answers) - 1, SPOT_CHECKS).astype(int)]
+    there = set(MapStore(store).numbers())
+    answers = [answer for answer in seen.answers if answer[0] in there]
+    chosen = [answers[i] for i in np.linspace(0, len(answers) - 1, SPOT_CHECKS).astype(int)] if answers else []
     alike = sum(
         digest(StoredMap(store, version).query(question(seed, options.points)).probability) == known
         for version, seed, known in chosen
     )
-    quarters = np.array_split(np.array(seen.memory), 4)
+    memory, disk = (np.array_split(np.array(values), 4) for values in (seen.memory, seen.disk))
     return {
         "cores": len(os.sched_getaffinity(0)),
         "minutes": options.minutes,
@@ -199,8 +221,10 @@ def summary(seen: Seen, options: argparse.Namespace, store: Path) -> dict[str, A
         "updates": len(u),
         "update p50 / p99, s": [round(float(v), 3) for v in np.quantile(u, [0.5, 0.99])] if len(u) else None,
         "versions seen": len({version for version, *_ in seen.answers}),
-        "memory by quarters, MB (most)": [round(float(part.max())) for part in quarters if len(part)],
-        "store on disk, MB": round(sum(f.stat().st_size for f in store.rglob("*") if f.is_file()) / 1e6),
+        "memory by quarters, MB (most)": [round(float(part.max())) for part in memory if len(part)],
+        "on disk by quarters, MB (most)": [round(float(part.max()), 1) for part in disk if len(part)],
+        "on disk at the end, bytes": round(1e6 * on_disk(store)),
+        "versions at the end": len(there),
         "errors": len(seen.errors),
         "first errors": seen.errors[:3],
         "spot checks exact": f"{alike} of {len(chosen)}",

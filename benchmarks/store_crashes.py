@@ -4,10 +4,11 @@
 
 Processes that write a map of SemanticKITTI 08, or of a synthetic street without `--data`, are killed: half of them
 after a random time, half right before a random one of their calls that sync, name or remove a file. They write by
-`StoredMap.update` and `commit`, spilling tiles all the time, or by `semgp.store.build`. After each kill the newest
-version is opened and all its tiles are read: it must be, file by file, what an undisturbed writer has after as
-many clouds, and not older than what the dead one was told was committed. What a dead writer leaves behind must be
-gone when the next one has begun. Writers go on until the map is whole. Exit code 1 if anything was otherwise.
+`StoredMap.update` and `commit`, spilling tiles all the time, or the same and old versions are dropped on the way,
+or by `semgp.store.build`. After each kill all tiles of all versions are read, and the newest must be, file by
+file, what an undisturbed writer has after as many clouds, and not older than what the dead one was told was
+committed. What a dead writer leaves behind must be gone when the next one has begun. Writers go on until the map
+is whole. Exit code 1 if anything was otherwise.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,23 +28,25 @@ from typing import Any
 
 import numpy as np
 
-from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
-from semgp.executors import Threads
-from semgp.maps.presets import OUTDOOR_LIDAR
-from semgp.readers import open_scans
-from semgp.store import MapStore, Settings, StoredMap, Tile, build
+from semgp.store import MapStore, StoredMap
+from store_writers import (
+    KEPT,
+    Tell,
+    Tiles,
+    by_build,
+    by_updates,
+    by_updates_that_drop,
+    pieces,
+    street,
+    undisturbed,
+)
 
-SECTORS = 6  # pieces of a scan, each a cloud of its own
-REACH, POINTS = 25.0, 3000  # metres, and points of each piece
-MODEL = replace(OUTDOOR_LIDAR, resolution=0.05)  # tiles of 12.8 m
-MOST_SITES = 10_000
 LIVES = 6  # a writer lives for a sixth of a map on average
 
-Tiles = dict[int, Tile]
-Tell = Callable[[int], Any]
 Write = Callable[[Path, Sequence[LabelledCloud], Tell], None]
+WRITERS: tuple[Write, ...] = (by_updates, by_updates_that_drop, by_build)
 
 
 @dataclass
@@ -61,64 +64,6 @@ class Outcome:
 
 class BrokenError(Exception):
     """A store is not as it must be."""
-
-
-def pieces(folder: Path) -> list[LabelledCloud]:
-    """Parts of the scans of a SemanticKITTI sequence, a few thousand points each."""
-    rng, parts = np.random.default_rng(0), []
-    for scan in open_scans(folder):
-        assert scan.origin is not None
-        x, y, _ = (scan.points - scan.origin).T
-        sector = ((np.arctan2(y, x) + np.pi) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
-        near = (np.hypot(x, y) < REACH) & scan.labelled
-        for s in range(SECTORS):
-            rows = np.flatnonzero(near & (sector == s))
-            parts.append(scan[rng.permutation(rows)[:POINTS]])
-    return parts
-
-
-def street(n: int) -> list[LabelledCloud]:
-    """Clouds along a street that was made up."""
-    rng, classes = np.random.default_rng(0), Classes(("road", "kerb", "wall"))
-    clouds = []
-    for i in range(n):
-        X = rng.uniform((2.0 * i, -8, 0), (2.0 * i + 15, 8, 0.1), (1500, 3))
-        clouds.append(LabelledCloud(X, classes, np.minimum(np.abs(X[:, 1]) // 3, 2).astype(np.int32)))
-    return clouds
-
-
-def by_updates(place: Path, clouds: Sequence[LabelledCloud], tell: Tell) -> None:
-    """Write a map cloud by cloud, from where it is."""
-    store = MapStore(place)
-    if not store.numbers():
-        store.create(Settings(clouds[0].classes, MODEL))
-    with StoredMap(store, most_sites=MOST_SITES) as stored:
-        for i in range(stored.clouds, len(clouds)):
-            stored.update(clouds[i])
-            if i % 3 == 2:
-                stored.commit()
-                tell(stored.clouds)
-
-
-def by_build(place: Path, clouds: Sequence[LabelledCloud], tell: Tell) -> None:
-    """Write a map by two threads, from where it is."""
-    store = MapStore(place)
-    if not store.numbers():
-        store.create(Settings(clouds[0].classes, MODEL))
-    start = store.manifest().clouds
-    for i in range(start, len(clouds), 4):
-        tell(build(store, clouds[i : i + 4], Threads(2), batch=2).clouds)
-
-
-def undisturbed(place: Path, clouds: Sequence[LabelledCloud]) -> dict[int, Tiles]:
-    """The tiles of a map after each number of clouds."""
-    found: dict[int, Tiles] = {0: {}}
-    with StoredMap.create(place, Settings(clouds[0].classes, MODEL)) as stored:
-        for i, cloud in enumerate(clouds, 1):
-            stored.update(cloud)
-            stored.commit()
-            found[i] = dict(MapStore(place).manifest().tiles)
-    return found
 
 
 def die_before(n: int) -> None:
@@ -178,22 +123,22 @@ def left_over(place: Path) -> tuple[int, int]:
     return len(half), len(orphans)
 
 
-def inspect(place: Path, wanted: dict[int, Tiles], told: int) -> int:
+def inspect(place: Path, wanted: dict[int, Tiles], told: int, drops: bool) -> int:
     """Return how many clouds a map has, after comparing all that it is with what it should be."""
     store = MapStore(place)
     numbers = store.numbers()
-    if numbers != list(range(1, len(numbers) + 1)):
-        raise BrokenError(f"versions {numbers}")
     if not numbers:
         return 0
+    if numbers != list(range(numbers[0] if drops else 1, numbers[-1] + 1)):
+        raise BrokenError(f"versions {numbers}")
     newest = store.manifest()
     if newest.clouds < told:
         raise BrokenError(f"{told} clouds were committed, {newest.clouds} are there")
     if newest.tiles != wanted[newest.clouds]:
         raise BrokenError(f"version {newest.number} is not that of {newest.clouds} clouds")
-    damaged = list(store.check())
-    if damaged:
-        raise BrokenError(f"version {newest.number}: {damaged[0]}")
+    for number in numbers:
+        if damaged := list(store.check(number)):
+            raise BrokenError(f"version {number}: {damaged[0]}")
     if newest.tiles:
         stored = StoredMap(store)
         stored.query(stored.positions[:50])
@@ -205,6 +150,7 @@ def trial(
 ) -> Outcome:
     """Write map after map by writers that are killed."""
     rng, outcome, begin = np.random.default_rng(seed), Outcome(), time.monotonic()
+    drops = write is by_updates_that_drop
     place = folder / f"{write.__name__}-undisturbed"
     killed(partial(write, place, clouds), None, None)
     life = (time.monotonic() - begin) / LIVES
@@ -218,7 +164,7 @@ def trial(
         calls = None if timed else 1 + int(rng.exponential(4 * files / LIVES))
         was_killed, last = killed(partial(write, place, clouds), seconds, calls)
         told = max(told, last)
-        now = inspect(place, wanted, told)
+        now = inspect(place, wanted, told, drops)
         if now < clouds_before:
             raise BrokenError(f"{clouds_before} clouds were there, {now} are left")
         half, orphans = left_over(place)
@@ -234,6 +180,8 @@ def trial(
         if not was_killed:
             if now != len(clouds):
                 raise BrokenError(f"a writer ended well, and the map has {now} clouds")
+            if drops and len(MapStore(place).numbers()) > KEPT + 1:  # the last one came after the last drop
+                raise BrokenError(f"versions {MapStore(place).numbers()} are left")
             outcome.maps, outcome.versions = outcome.maps + 1, outcome.versions + len(MapStore(place).numbers())
             place, clouds_before, told = folder / f"{write.__name__}-{outcome.maps}", 0, 0
     outcome.seconds = time.monotonic() - begin
@@ -247,8 +195,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    if options.kills < 2:
-        parser.error("--kills must be 2 at least")
+    if options.kills < len(WRITERS):
+        parser.error(f"--kills must be {len(WRITERS)} at least")
     try:
         clouds = street(20) if options.data is None else pieces(options.data)
     except InputError as error:
@@ -256,7 +204,8 @@ def main() -> None:
     outcomes: dict[str, Outcome] = {}
     with TemporaryDirectory() as folder:
         wanted = undisturbed(Path(folder) / "undisturbed", clouds)
-        for kills, write in ((options.kills // 2, by_updates), (options.kills - options.kills // 2, by_build)):
+        for i, write in enumerate(WRITERS):
+            kills = (options.kills + i) // len(WRITERS)
             try:
                 outcomes[write.__name__] = trial(write, clouds, wanted, kills, Path(folder), options.seed)
             except BrokenError as error:
@@ -269,9 +218,8 @@ def main() -> None:
         print(f"{name}: {o.kills} kills in {o.seconds:.0f} s, {o.maps} maps completed, {o.versions} versions")
         print(f"  half-written files after {o.left_partial}, files of no version after {o.left_orphans}, ", end="")
         print(f"nothing committed yet after {o.empty}")
-    print(
-        "After each kill the newest version was that of an undisturbed writer; leftovers were gone with the next."
-    )
+    print("After each kill the newest version was that of an undisturbed writer, and all versions were whole;")
+    print("leftovers were gone with the next writer.")
 
 
 if __name__ == "__main__":

@@ -14,8 +14,8 @@ from sklearn import metrics as sk
 
 from semgp.errors import InputError
 from semgp.evaluation.auc import auc_total, hand_till_auc, one_vs_rest_auc
-from semgp.evaluation.calibration import FLOOR, brier, ece, nll, reliability
-from semgp.evaluation.metrics import accuracy, confusion, iou
+from semgp.evaluation.calibration import FLOOR, brier, ece, nll, probability_of_truth, reliability
+from semgp.evaluation.metrics import accuracy, confusion, iou, precision, recall
 from semgp.evaluation.scores import score
 from tests import naive
 
@@ -131,6 +131,27 @@ def test_confusion_accuracy_and_iou_equal_scikit_learn() -> None:
     np.testing.assert_array_equal(table[:, :5], sk.confusion_matrix(truth, label))
     assert accuracy(table) == sk.accuracy_score(truth, label)
     np.testing.assert_allclose(iou(table), sk.jaccard_score(truth, label, average=None))
+
+
+def test_precision_and_recall_equal_scikit_learn() -> None:
+    p, truth = random_case(12, missing=True)
+    label, known = p.argmax(axis=1), truth >= 0
+    table = confusion(label, truth, 5)
+    for ours, theirs in ((precision, sk.precision_score), (recall, sk.recall_score)):
+        np.testing.assert_allclose(ours(table), theirs(truth[known], label[known], average=None))
+
+
+def test_precision_and_recall_without_points() -> None:
+    table = confusion([0, 0, -1, 2], [0, 1, 1, 0], 4)
+    np.testing.assert_array_equal(precision(table), [0.5, math.nan, 0, math.nan])
+    np.testing.assert_array_equal(recall(table), [0.5, 0, math.nan, math.nan])
+
+
+def test_probability_of_truth_is_the_mean_over_the_points_of_each_class() -> None:
+    p, truth = random_case(13, missing=True)
+    truth[truth == 2] = 1
+    means = [p[truth == c, c].mean() if (truth == c).any() else math.nan for c in range(5)]
+    np.testing.assert_allclose(probability_of_truth(p, truth), means)
 
 
 def test_withheld_answers_are_wrong_but_no_false_alarm() -> None:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, TypeAlias, cast, get_args
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Literal, TypeAlias, cast, get_args
 
 from semgp.errors import InputError
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    F64: TypeAlias = NDArray[np.float64]
+
 Up: TypeAlias = Literal["x", "y", "z", "-x", "-y", "-z"]
 """An axis and its sign: "z" in ROS REP-103 and in most maps, "-y" in a world that is a camera's optical frame."""
-
-F64 = NDArray[np.float64]
 
 
 def direction(up: str) -> F64:
@@ -24,6 +25,8 @@ def direction(up: str) -> F64:
     InputError
         What names no axis.
     """
+    import numpy as np
+
     axis = np.zeros(3)
     axis[vertical(up)] = -1.0 if up.startswith("-") else 1.0
     return axis
@@ -53,6 +56,8 @@ def level(up: str) -> F64:
     InputError
         What names no axis.
     """
+    import numpy as np
+
     k = vertical(up)
     R, sign = np.zeros((3, 3)), direction(up)[k]
     R[0, (k + 1) % 3], R[1, (k + 2) % 3], R[2, k] = 1.0, sign, sign
@@ -69,6 +74,8 @@ def up_of_cameras(poses: Sequence[F64]) -> Up:
     poses : sequence of (4, 4) arrays
         At least one `T_world_sensor` of an optical frame (x right, y down, z forward).
     """
+    import numpy as np
+
     upward = -np.mean([T[:3, 1] for T in poses], axis=0)
     axis = int(np.abs(upward).argmax())
     return cast("Up", ("-" if upward[axis] < 0 else "") + "xyz"[axis])

@@ -58,7 +58,7 @@ def test_nothing_is_read_before_it_is_asked_for_and_nothing_kept(
         read[k] += 1
         return LabelledCloud(np.zeros((1, 3)), ROAD, np.zeros(1, np.int32))
 
-    monkeypatch.setattr("semgp.cli.inputs.open_scans", lambda path: Scans(range(5), scan))
+    monkeypatch.setattr("semgp.readers.open_scans", lambda path: Scans(range(5), scan))
     clouds = sources([tmp_path])
     assert not read
     list(clouds)

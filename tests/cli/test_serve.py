@@ -84,6 +84,8 @@ def test_ctrl_c_ends_with_130_and_a_file_has_the_token(store: Path, corner: Labe
         (("--port", "99999"), "port is a number"),
         (("--host", "192.0.2.1", "--token-file", "TOKEN"), "cannot listen on 192.0.2.1"),
         (("--timeout", "0"), "seconds must be positive"),
+        (("--keep", "-1"), "0 for all of them, not -1"),
+        (("--poll", "-1"), "never (0), not -1"),
         (("--token-file", "none.txt"), "none.txt"),
     ],
 )

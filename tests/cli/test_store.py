@@ -8,6 +8,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from semgp.cli.places import named
 from semgp.maps.files import load_map
 from semgp.maps.presets import GENERAL
 from semgp.store import Manifest, MapStore, Settings, StoredMap
@@ -71,14 +72,14 @@ def test_an_interrupted_build_goes_on(
 ) -> None:
     more = ("--half-life", "5") if forgets else ()
     command = ("build", *scans, "--out", tmp_path / "drive", *FAST, *more)
-    publish = MapStore.publish
+    add = MapStore.add
 
-    def interrupted(store: MapStore, manifest: Manifest, note: str = "") -> Manifest:
-        if manifest.number == 2:
+    def interrupted(store: MapStore, manifest: Manifest) -> None:
+        if manifest.number == 3:
             raise KeyboardInterrupt
-        return publish(store, manifest, note)
+        add(store, manifest)
 
-    with mock.patch.object(MapStore, "publish", interrupted):
+    with mock.patch.object(MapStore, "add", interrupted):
         assert run(*command) == 130
     assert "holds version 2 with 8 scans; --resume goes on" in " ".join(capsys.readouterr().err.split())
     assert MapStore(tmp_path / "drive").manifest().clouds == 8
@@ -96,7 +97,7 @@ def test_an_interrupted_build_goes_on(
 def test_an_interrupted_update_recommends_nothing_that_it_has_not(
     built: Path, scans: list[Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with mock.patch.object(MapStore, "publish", side_effect=KeyboardInterrupt):
+    with mock.patch.object(MapStore, "add", side_effect=KeyboardInterrupt):
         assert run("update", built, scans[4], "--workers", "1") == 130
     error = " ".join(capsys.readouterr().err.split())
     assert "holds version 2 with 4 scans" in error
@@ -115,17 +116,16 @@ def test_resuming_a_build_that_is_whole_keeps_its_versions(built: Path, scans: l
 
 
 def test_a_build_ends_well_beside_another_writer(scans: list[Path], tmp_path: Path) -> None:
-    publish = MapStore.publish
+    add = MapStore.add
     other: list[StoredMap] = []
 
-    def beside(store: MapStore, manifest: Manifest, note: str = "") -> Manifest:
-        made = publish(store, manifest, note)
-        if made.clouds:
+    def beside(store: MapStore, manifest: Manifest) -> None:
+        add(store, manifest)
+        if manifest.clouds:
             other.append(StoredMap(tmp_path / "drive"))
             other[0].update(cloud(9))
-        return made
 
-    with mock.patch.object(MapStore, "publish", beside):
+    with mock.patch.object(MapStore, "add", beside):
         code = run("build", *scans[:4], "--out", tmp_path / "drive", *FAST)
     other[0].close()
     assert MapStore(tmp_path / "drive").manifest().clouds == 4
@@ -226,9 +226,9 @@ def test_export_of_a_store_to_zarr(built: Path, capsys: pytest.CaptureFixture[st
         ("no version 9", ("store", "rollback", "{drive}", "--to", "9")),
         ("at least one version", ("store", "prune", "{drive}", "--keep", "0")),
         ("no version 9", ("store", "check", "{drive}", "--version", "9")),
-        ("holds no map", ("store", "versions", "{new}")),
-        ("holds no map", ("store", "check", "{new}")),
-        ("holds no map", ("store", "prune", "{new}", "--keep", "1")),
+        ("no such file or folder", ("store", "versions", "{new}")),
+        ("no such file or folder", ("store", "check", "{new}")),
+        ("no such file or folder", ("store", "prune", "{new}", "--keep", "1")),
         ("holds no map", ("info", "{folder}")),
         ("cannot be opened", ("store", "versions", "nosuch://bucket/x")),
         ("cannot be read", ("store", "versions", "{scan}")),
@@ -259,3 +259,8 @@ def test_scans_without_labels_make_no_map(tmp_path: Path, capsys: pytest.Capture
     np.savez(tmp_path / "bare.npz", points=plain.points, names=np.array(CLASSES.names), labels=np.full(300, -1))
     error = refused(capsys, "build", tmp_path / "bare.npz", "--out", tmp_path / "drive", *FAST)
     assert "no scan has a label" in error
+
+
+def test_urls_are_said_as_they_are_given() -> None:
+    assert named(Path("s3://maps/drive")) == "s3://maps/drive"
+    assert named(Path("maps/drive")) == "maps/drive"

@@ -1,12 +1,20 @@
-"""One Ray cluster for the tests of a module."""
+"""One Ray cluster for the tests of a module, and what is built by it."""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
+from semgp.cloud import LabelledCloud
 from semgp.executors import Executor, Threads, open_executor
+from semgp.maps.free_space import FreeSpace
+from semgp.maps.presets import OUTDOOR_LIDAR
+from semgp.readers import open_scans
+from semgp.store import Settings
+from tests.executors.pieces import CLOUDS
+from tests.store import scenes
 
 
 @pytest.fixture(scope="module")
@@ -26,3 +34,14 @@ def executor(request: pytest.FixtureRequest) -> Executor:
         cluster: Executor = request.getfixturevalue("ray_cluster")
         return cluster
     return Threads(1 if request.param == "one thread" else 2)
+
+
+@pytest.fixture(scope="module")
+def scans(request: pytest.FixtureRequest) -> tuple[Sequence[LabelledCloud], Settings]:
+    """Ten SemanticKITTI scans where they are, else the street."""
+    try:
+        folder: Path = request.getfixturevalue("data_dir")
+    except pytest.skip.Exception:
+        return CLOUDS, scenes.FREE
+    clouds = open_scans(folder / "semantickitti_08")[:10]
+    return clouds, Settings(clouds[0].classes, OUTDOOR_LIDAR, FreeSpace(rays=2000))

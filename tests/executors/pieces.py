@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError, MissingExtraError
 from semgp.store import MapStore, Settings
+from tests.store import scenes
+
+CLOUDS = [scenes.cloud(i, 2.5 * i, n=200) for i in range(10)]
+"""The street."""
 
 
 def square(x: int) -> int:
@@ -77,7 +81,7 @@ class Slow(Sequence[LabelledCloud]):
         return self.clouds[i]
 
 
-def new_store(folder: Path, settings: Settings) -> MapStore:
+def new_store(folder: Path | str, settings: Settings) -> MapStore:
     store = MapStore(folder)
     store.create(settings)
     return store

@@ -14,17 +14,13 @@ from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.executors import Executor, Threads
-from semgp.maps.free_space import FreeSpace
-from semgp.maps.presets import OUTDOOR_LIDAR
-from semgp.readers import open_scans
 from semgp.store import MapStore, Settings, Tile, build
 from semgp.store.asking import query
-from tests.executors.pieces import Slow, new_store
+from tests.executors.pieces import CLOUDS, Slow, new_store
 from tests.store import scenes
 
 DEATHS = 3
 OTHER = Classes(("sky",))
-CLOUDS = [scenes.cloud(i, 2.5 * i, n=200) for i in range(10)]
 
 
 @pytest.fixture(scope="module", params=[scenes.PLAIN, scenes.FREE], ids=["labels", "free space"])
@@ -99,17 +95,6 @@ class TestDeaths:
         assert len(killed) == DEATHS
         assert manifest.tiles == undisturbed
         assert not list(store.check())
-
-
-@pytest.fixture
-def scans(request: pytest.FixtureRequest) -> tuple[Sequence[LabelledCloud], Settings]:
-    """Ten SemanticKITTI scans where they are, else the street."""
-    try:
-        folder: Path = request.getfixturevalue("data_dir")
-    except pytest.skip.Exception:
-        return CLOUDS, scenes.FREE
-    clouds = open_scans(folder / "semantickitti_08")[:10]
-    return clouds, Settings(clouds[0].classes, OUTDOOR_LIDAR, FreeSpace(rays=2000))
 
 
 def _kill(readers: Path, stop: threading.Event, killed: list[int]) -> None:

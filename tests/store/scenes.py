@@ -38,6 +38,10 @@ def cloud(seed: int, x: float = 0.0, n: int = 300, **more: Any) -> LabelledCloud
     return LabelledCloud(X, CLASSES, **given, T_world_sensor=T, **more)
 
 
+STREET = [cloud(i, 3.0 * i) for i in range(5)]
+"""Five clouds, each three metres further along."""
+
+
 def uncertain(seed: int, x: float = 0.0) -> LabelledCloud:
     """A cloud whose positions are known to one or two centimetres."""
     rng = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ from semgp.executors import Threads
 from semgp.maps.files import save_map
 from semgp.readers import read
 from semgp.store import MapStore, Settings, asking
+from semgp.store.groups import groups
 from semgp.writers import write_npz
 from tests.store import scenes
 from tests.store.scenes import assert_same, cloud, places, stored
@@ -39,10 +40,15 @@ def test_answers_are_those_of_the_whole_map(tmp_path: Path, settings: Settings) 
 def test_each_row_is_asked_once_and_pieces_are_small(tmp_path: Path) -> None:
     manifest = stored(tmp_path / "map", *(cloud(i, 3.0 * i) for i in range(5))).store.manifest()
     X = np.vstack([places(3, 1000), np.full((400, 3), 1.5)])
-    pieces = list(asking._pieces(X, manifest))
+    sizes = {key: tile.sites for key, tile in manifest.tiles.items()}
+    origin = np.array(manifest.origin, dtype=np.int64)
+    pieces = list(groups(X, manifest.settings, origin, sizes, 700, 150))
     np.testing.assert_array_equal(np.sort(np.concatenate([rows for rows, _ in pieces])), np.arange(len(X)))
     assert all(len(rows) <= 150 for rows, _ in pieces)
-    assert all(set(tiles) < set(manifest.tiles) for _, tiles in pieces)
+    assert all(set(tiles.tolist()) & set(sizes) < set(sizes) for _, tiles in pieces)
+    together = [sum(sizes.get(tile, 0) for tile in tiles.tolist()) for _, tiles in pieces]
+    alone = [len(np.unique(manifest.settings.tiling.of_points(X[rows], 0.02, origin))) == 1 for rows, _ in pieces]
+    assert all(n <= 700 or one for n, one in zip(together, alone))
 
 
 def test_an_older_version_is_asked(tmp_path: Path) -> None:

@@ -67,6 +67,16 @@ class History(RuleBasedStateMachine):
             made = MapStore(self.place / "map").roll_back(number)
             self.versions[made.number] = list(self.versions[number])
 
+    @rule(data=st.data())
+    def drop(self, data: Any) -> None:
+        """Let go of some versions, not of that which is read; nothing goes while there are updates."""
+        some = data.draw(st.sets(st.sampled_from(sorted(self.versions))))
+        dropped = MapStore(self.place / "map").drop(some - {self.base})
+        assert (dropped is None) == bool(self.new)
+        if dropped is not None:
+            for number in some - {self.base, max(self.versions)}:
+                del self.versions[number]
+
     @rule()
     def refresh(self) -> None:
         if not self.new:

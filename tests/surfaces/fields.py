@@ -28,7 +28,6 @@ class AnalyticMap:
     up: Up = "z"
     classes = TWO
     resolution = 0.1
-    up: Up = "z"
 
     def __init__(self, log_odds: Callable[[F64], F64], occupied: F64, free: F64) -> None:
         self.log_odds = log_odds

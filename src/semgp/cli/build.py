@@ -5,29 +5,25 @@ from __future__ import annotations
 import warnings
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
-from rich.progress import Progress
 
-from semgp.blocks.model import BlockModel
 from semgp.cli.console import counted, progress, report
 from semgp.cli.inputs import PLAIN, AnyInputs, Upward, at_most, sources, tell_labels
 from semgp.cli.learn import LEAST_OVERLAP, PAPER, SAMPLE, block_model, learn_blocks, learn_paper, overlap
+from semgp.cli.places import named, require_place
 from semgp.cli.update import BUILDING, Address, Count, Workers, fill, update_store
 from semgp.errors import InputError
-from semgp.gp.model import GPModel
-from semgp.maps.files import is_file_name, save_map
-from semgp.maps.forgetting import Forgetting
-from semgp.maps.free_space import FreeSpace
-from semgp.maps.gp import GPSemanticMap
-from semgp.maps.kinds import MAP_KINDS
-from semgp.maps.presets import PRESETS
-from semgp.maps.protocol import SerialisableMap
-from semgp.readers import Scans
-from semgp.store import MapStore, Settings
-from semgp.store.bucket import as_url
-from semgp.upward import Up
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from semgp.blocks.model import BlockModel
+    from semgp.maps.protocol import SerialisableMap
+    from semgp.readers import Scans
+    from semgp.store import MapStore
+    from semgp.upward import Up
 
 Kind = Literal["gp", "octomap", "knn", "csm", "bki"]
 PaperNumber = Annotated[int, Parameter(group="The paper's GP")]
@@ -112,24 +108,27 @@ def build(
     """
     if (free_space or half_life is not None) and (kind != "gp" or model == PAPER):
         raise InputError("--free-space and --half-life are for the GP map of many blocks: leave them out.")
+    require_place(*scans)
+
+    from semgp.cli.describe import elements
+    from semgp.gp.model import GPModel
+    from semgp.maps.files import is_file_name, save_map
+    from semgp.maps.forgetting import Forgetting
+    from semgp.maps.free_space import FreeSpace
+    from semgp.maps.gp import GPSemanticMap
+    from semgp.maps.kinds import MAP_KINDS
+    from semgp.store import MapStore, Settings
+
     one_file = is_file_name(out)
     if one_file and (resume or executor != "threads"):
         raise InputError("--resume and --executor are for stores: give --out a name that does not end in .semgp.")
     if not one_file and (kind != "gp" or model == PAPER):
         raise InputError(
-            f"{out}: only GP maps of many blocks are kept in stores: give --out a name.semgp instead."
+            f"{named(out)}: only GP maps of many blocks are kept in stores: give --out a name.semgp instead."
         )
     clouds = sources(scans, inputs)
-    if not one_file and MapStore(out).numbers():
-        if not resume:
-            raise InputError(
-                f"{out} holds a map already: `semgp update` adds scans to it, --resume goes on with a build that "
-                "was interrupted."
-            )
-        manifest = MapStore(out).manifest()
-        if manifest.note != BUILDING:
-            raise InputError(f"{out} has been changed since it was built: add scans to it with `semgp update`.")
-        update_store(out, clouds, executor, workers, address, done=manifest.clouds)
+    if not one_file and (done := _clouds_taken(MapStore(out), resume)) is not None:
+        update_store(out, clouds, executor, workers, address, done=done)
         return
     free = FreeSpace() if free_space or half_life is not None else None
     forgetting = None if half_life is None else Forgetting(half_life)
@@ -155,16 +154,33 @@ def build(
         return
     tell_labels(clouds)
     save_map(semantic_map, out)
-    n = len(semantic_map)
-    report(
-        f"{out}: {kind} map of {n:,} elements from {counted(len(clouds), 'scan')}", out=out, kind=kind, elements=n
-    )
+    words = f"{out}: {kind} map of {elements(semantic_map)} from {counted(len(clouds), 'scan')}"
+    report(words, out=out, kind=kind, elements=len(semantic_map))
+
+
+def _clouds_taken(store: MapStore, resume: bool) -> int | None:
+    """How many clouds a build that was interrupted has taken in; None where there is no map yet."""
+    if not store.numbers():
+        return None
+    if not resume:
+        raise InputError(
+            f"{store.location} holds a map already: `semgp update` adds scans to it, --resume goes on with a "
+            "build that was interrupted."
+        )
+    manifest = store.manifest()
+    if manifest.note != BUILDING:
+        raise InputError(
+            f"{store.location} has been changed since it was built: add scans to it with `semgp update`."
+        )
+    return manifest.clouds
 
 
 def _blocks(
     clouds: Scans, model: str, resolution: float | None, up: Up, learn: bool, seed: int, bars: Progress
 ) -> BlockModel:
     """The model of blocks, learned where it is to be."""
+    from semgp.maps.presets import PRESETS
+
     blocks = block_model(model, resolution, up)
     if not learn or model not in PRESETS:
         return blocks
@@ -183,6 +199,9 @@ def _blocks(
 
 def _drop_steps(out: Path) -> None:
     """Remove the versions on the way to a finished map, where nobody else can be at work on it."""
+    from semgp.store import MapStore
+    from semgp.store.bucket import as_url
+
     if as_url(out) is None:
         with suppress(InputError):
             MapStore(out).prune(1)

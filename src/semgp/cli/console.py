@@ -9,16 +9,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
-from rich.table import Table
-from rich.text import Text
+from rich.console import Console, RenderableType
 
 from semgp.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+    from rich.table import Table
 
 STDOUT = Console(width=None if sys.stdout.isatty() else 124)
 STDERR = Console(stderr=True)
@@ -42,13 +41,13 @@ def behave(*, quiet: bool, verbose: bool, json: bool) -> None:
     STDOUT.quiet = quiet or json
 
 
-def report(words: str | Table, **facts: Any) -> None:
+def report(words: RenderableType, **facts: Any) -> None:
     """Say what came out, once a command: words for people or, with --json, the facts as one JSON object.
 
     Parameters
     ----------
-    words : str or Table
-        One line, or a table of scores.
+    words : str or another renderable of Rich
+        One line, or tables of scores.
     **facts
         The same for programs: numbers, texts, paths, arrays, and lists and mappings of them.
     """
@@ -66,35 +65,17 @@ def progress(quiet: bool = False) -> Iterator[Progress]:
 
     With --verbose, the time that each task took is written afterwards.
     """
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), _Pace(), TimeElapsedColumn())
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from semgp.cli.pace import Pace
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), Pace(), TimeElapsedColumn())
     silent = quiet or MANNERS.quiet or not STDERR.is_terminal
     with Progress(*columns, console=STDERR, transient=True, disable=silent) as bars:
         yield bars
     if MANNERS.verbose:
         for task in bars.tasks:
             STDERR.print(f"{task.description}: {task.elapsed or 0:.2f} s", markup=False, highlight=False)
-
-
-class _Pace(ProgressColumn):
-    """How many are done, how fast, and the time that is left; nothing where the total is not known."""
-
-    def render(self, task: Task) -> Text:
-        if task.total is None:
-            return Text()
-        words = f"{task.completed:,.0f}/{task.total:,.0f}"
-        speed = task.finished_speed or task.speed
-        if speed:
-            words += (
-                f"  {speed:,.0f}/s"
-                if speed >= 10
-                else f"  {speed:.1f}/s"
-                if speed >= 1
-                else f"  {1 / speed:.1f} s each"
-            )
-        if task.time_remaining:
-            minutes, seconds = divmod(math.ceil(task.time_remaining), 60)
-            words += f"  {minutes}:{seconds:02d} left"
-        return Text(words, style="progress.remaining")
 
 
 def counted(n: int, what: str) -> str:
@@ -115,7 +96,7 @@ def _plain(value: Any) -> Any:
     """Return a value as JSON has it: paths as texts, arrays as lists, what is not finite as null."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # an array, or a number of numpy's
         return _plain(value.tolist())
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
@@ -126,15 +107,21 @@ def _plain(value: Any) -> Any:
 
 HEADINGS = {
     **{"auc": "AUC", "miou": "mIoU", "nll": "NLL", "ece": "ECE", "brier": "Brier", "n_train": "labels"},
+    **{"iou": "IoU", "probability": "p(true)"},
     **{"learn_seconds": "learn s", "fit_seconds": "fit s", "query_seconds": "query s", "peak_rss_mb": "MB"},
 }
 
 
 def score_table(title: str, rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> Table:
     """Return a table of rows of scores, numbers to four digits, seconds to two, all else to whole numbers."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
     table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.caption_justify = "left"
     for name in columns:
-        justify: Literal["left", "right"] = "left" if name in ("frame", "method") else "right"
+        of_words = any(isinstance(row.get(name), str) for row in rows)
+        justify: Literal["left", "right"] = "left" if of_words else "right"
         table.add_column(HEADINGS.get(name, name), justify=justify, no_wrap=True)
     for row, following in zip(rows, [*rows[1:], None], strict=True):
         means_follow = following is not None and row.get("frame") != following.get("frame") == "mean"
@@ -143,7 +130,7 @@ def score_table(title: str, rows: Sequence[dict[str, Any]], columns: Sequence[st
 
 
 def _cell(name: str, value: Any) -> str:
-    if value is None:
+    if value is None or value != value:  # NaN
         return "-"
     if isinstance(value, float) and name not in ("n_train", "peak_rss_mb"):
         return f"{value:.2f}" if name.endswith("seconds") else f"{value:.4f}"

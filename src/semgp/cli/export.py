@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from semgp.cli.console import progress, report
+from semgp.cli.places import require_place
 from semgp.cli.space import spatial_map
 from semgp.errors import InputError
-from semgp.logs.maps import write_map
-from semgp.maps.abilities import as_spatial, resolution_of
-from semgp.maps.batches import query_in_batches
-from semgp.maps.files import load_map
-from semgp.maps.grid import write_grid
-from semgp.maps.octree import to_octomap
-from semgp.maps.points import POINT_WRITERS, point_writer, write_prediction
-from semgp.maps.protocol import SemanticMap
-from semgp.maps.surface import surface_of
-from semgp.octomap import SemanticOctoMap
+
+if TYPE_CHECKING:
+    from semgp.maps.protocol import SemanticMap
 
 OCTOMAP_SUFFIXES = (".bt", ".ot")
 BAG_SUFFIXES = (".mcap", ".db3", ".bag")
 GRID_SUFFIX = ".zarr"
-FORMATS = (*POINT_WRITERS, *OCTOMAP_SUFFIXES, *BAG_SUFFIXES, GRID_SUFFIX)
 
 
 def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> None:
@@ -44,9 +38,14 @@ def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> 
     resolution
         Spacing of the points, or edge of the voxels, in metres; left out, the map's own.
     """
+    require_place(map_file)
+
+    from semgp.maps.points import POINT_WRITERS
+
     suffix = out.suffix.lower()
-    if suffix not in FORMATS:
-        raise InputError(f"{out}: a map is written as {', '.join(FORMATS)}.")
+    formats = (*POINT_WRITERS, *OCTOMAP_SUFFIXES, *BAG_SUFFIXES, GRID_SUFFIX)
+    if suffix not in formats:
+        raise InputError(f"{out}: a map is written as {', '.join(formats)}.")
     if suffix == GRID_SUFFIX:
         _export_grid(map_file, out, resolution)
     elif suffix in BAG_SUFFIXES:
@@ -58,6 +57,11 @@ def export(map_file: Path, /, *, out: Path, resolution: float | None = None) -> 
 
 
 def _export_points(map_file: Path, out: Path, resolution: float | None) -> None:
+    from semgp.maps.batches import query_in_batches
+    from semgp.maps.files import load_map
+    from semgp.maps.points import point_writer, write_prediction
+    from semgp.maps.surface import surface_of
+
     point_writer(out)
     semantic_map = load_map(map_file)
     if resolution is None:
@@ -71,6 +75,13 @@ def _export_points(map_file: Path, out: Path, resolution: float | None) -> None:
 
 
 def _export_bag(map_file: Path, out: Path, resolution: float | None) -> None:
+    from semgp.logs.maps import write_map
+    from semgp.maps.abilities import as_spatial
+    from semgp.maps.files import load_map
+    from semgp.maps.octree import to_octomap
+    from semgp.maps.surface import surface_of
+    from semgp.octomap import SemanticOctoMap
+
     semantic_map = load_map(map_file)
     edge = _resolution(map_file, semantic_map) if resolution is None else resolution
     X = surface_of(semantic_map, edge)
@@ -86,6 +97,9 @@ def _export_bag(map_file: Path, out: Path, resolution: float | None) -> None:
 
 
 def _export_grid(map_file: Path, out: Path, resolution: float | None) -> None:
+    from semgp.maps.files import load_map
+    from semgp.maps.grid import write_grid
+
     semantic_map = load_map(map_file)
     edge = _resolution(map_file, semantic_map) if resolution is None else resolution
     with progress() as bars:
@@ -96,6 +110,8 @@ def _export_grid(map_file: Path, out: Path, resolution: float | None) -> None:
 
 def _resolution(map_file: Path, semantic_map: SemanticMap) -> float:
     """Return the resolution of a map that has one."""
+    from semgp.maps.abilities import resolution_of
+
     resolution = resolution_of(semantic_map)
     if resolution is None:
         raise InputError(f"{map_file} has no resolution of its own: give --resolution METRES.")
@@ -103,6 +119,9 @@ def _resolution(map_file: Path, semantic_map: SemanticMap) -> float:
 
 
 def _export_octomap(map_file: Path, out: Path, resolution: float | None) -> None:
+    from semgp.maps.octree import to_octomap
+    from semgp.octomap import SemanticOctoMap
+
     semantic_map = spatial_map(map_file)
     if isinstance(semantic_map, SemanticOctoMap):
         if resolution not in (None, semantic_map.resolution):

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from semgp.class_files import class_list, remapping
 from semgp.cli.console import MANNERS, STDERR, counted
-from semgp.cli.reading import Reading
+from semgp.cli.places import require_place
 from semgp.errors import InputError
-from semgp.logs.scans import LogScans
-from semgp.readers import Scans, open_scans
-from semgp.segmentation import labelled_scans, segmenter_of
 from semgp.upward import Up
+
+if TYPE_CHECKING:
+    from semgp.readers import Scans
 
 
 @dataclass(frozen=True)
@@ -118,6 +117,14 @@ def sources(paths: Sequence[Path], inputs: Inputs = PLAIN) -> Scans:
     """
     if not paths:
         raise InputError("give at least one scan: a point file or a data-set folder.")
+    require_place(*paths)
+
+    from semgp.class_files import class_list, remapping
+    from semgp.cli.reading import Reading
+    from semgp.logs.scans import LogScans
+    from semgp.readers import Scans, open_scans
+    from semgp.segmentation import labelled_scans, segmenter_of
+
     options: dict[str, Any] = {
         f.name: getattr(inputs, f.name) for f in fields(inputs) if f.name not in _ABOUT_SCANS
     }
@@ -151,11 +158,15 @@ def at_most(scans: Scans, count: int, stride: int) -> Scans:
 
 def dropped_labels(scans: Scans) -> dict[str, int]:
     """Return how many labels of each class --remap has dropped from the `sources` that were read so far."""
+    from semgp.cli.reading import Reading
+
     return dict(scans.scan.dropped) if isinstance(scans.scan, Reading) else {}
 
 
 def tell_labels(scans: Scans) -> None:
     """Tell on standard error how many of the points that were read have labels, and which --remap has dropped."""
+    from semgp.cli.reading import Reading
+
     reading = scans.scan
     if MANNERS.quiet or not isinstance(reading, Reading) or not reading.points:
         return

@@ -6,21 +6,19 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-from rich.progress import Progress
-
-from semgp.blocks.learning import learn_from_scans
-from semgp.blocks.model import BlockModel
 from semgp.cli.console import progress, report
 from semgp.cli.inputs import PLAIN, AnyInputs, Upward, at_most, sources
-from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
-from semgp.gp.model import GPModel
-from semgp.maps.learning import learn_model
-from semgp.maps.presets import PRESETS, with_vertical
 from semgp.upward import Up, vertical
-from semgp.writers import atomic_write
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from semgp.blocks.model import BlockModel
+    from semgp.cloud import LabelledCloud
+    from semgp.gp.model import GPModel
 
 PAPER = "paper"
 """The name of the whole-scan GP among the models."""
@@ -65,6 +63,9 @@ def learn(
         Seed of every random draw.
     """
     clouds = sources(scans, inputs)
+
+    from semgp.writers import atomic_write
+
     with progress() as bars:
         up = up or clouds[0].up
         learned = learn_blocks(at_most(clouds, *SAMPLE), block_model(model, resolution, up), up, seed, bars)
@@ -79,6 +80,9 @@ def learn(
 
 def block_model(name: str, resolution: float | None, up: Up) -> BlockModel:
     """Return a preset turned to the world's vertical axis, or the model in a file as it is."""
+    from semgp.blocks.model import BlockModel
+    from semgp.maps.presets import PRESETS, with_vertical
+
     if name in PRESETS:
         model = with_vertical(PRESETS[name], vertical(up))
     elif name.endswith(".json"):
@@ -104,6 +108,8 @@ def learn_blocks(
     InputError
         Scans of different places, which cannot judge each other.
     """
+    from semgp.blocks.learning import learn_from_scans
+
     if (shared := overlap(sources, model.resolution)) < LEAST_OVERLAP:
         raise InputError(
             f"the scans see different places: of what one half of them sees, the other sees {shared:.0%}. They "
@@ -120,6 +126,8 @@ def learn_blocks(
 
 def overlap(clouds: Sequence[LabelledCloud], resolution: float) -> float:
     """Return the share of places, four voxels wide, that every other scan sees of what the others see."""
+    import numpy as np
+
     edge, labelled = 4 * resolution, [cloud.points[cloud.labelled] for cloud in clouds if cloud.labelled.any()]
     halves = [np.unique(np.floor(np.concatenate(h) / edge), axis=0) for h in (labelled[::2], labelled[1::2]) if h]
     if len(halves) < 2:
@@ -130,6 +138,8 @@ def overlap(clouds: Sequence[LabelledCloud], resolution: float) -> float:
 
 def learn_paper(sources: Sequence[LabelledCloud], model: GPModel, iterations: int, bars: Progress) -> GPModel:
     """Return the paper's GP with hyperparameters learned from the first labelled scan."""
+    from semgp.maps.learning import learn_model
+
     bar = bars.add_task("learning hyperparameters", total=None)
     first = next((cloud for cloud in sources if cloud.labelled.any()), sources[0])
 

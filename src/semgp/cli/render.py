@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from semgp.cli.inputs import PLAIN, AnyInputs, Upward, sources
+from semgp.cli.places import require_place
 from semgp.errors import InputError
 
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
@@ -87,6 +88,8 @@ def render(
     rate
         Pictures a second.
     """
+    require_place(map_file, *(cloud or ()))
+
     from semgp.cli.console import progress, report
     from semgp.maps.batches import query_in_batches
     from semgp.maps.files import load_map

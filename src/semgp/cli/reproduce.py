@@ -122,7 +122,7 @@ def semantickitti(
 def _run(tasks: Iterable[Any], n_tasks: int, methods: Mapping[str, Method], **drawing: Any) -> Experiment:
     """Run an experiment with progress."""
     from semgp.cli.console import progress
-    from semgp.evaluation.curves import require_matplotlib
+    from semgp.evaluation.canvas import require_matplotlib
     from semgp.evaluation.experiment import run_experiment
 
     if drawing.get("view") is not None:

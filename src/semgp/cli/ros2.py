@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from semgp.cli.console import STDOUT, report
+from semgp.cli.places import require_place
 
 if TYPE_CHECKING:
     from semgp.classes import Classes
@@ -28,6 +29,8 @@ def topics(bag: Path, /) -> None:
     bag
         A ROS 1 bag (.bag), a ROS 2 bag (a folder with metadata.yaml), or one of its files (.mcap, .db3).
     """
+    require_place(bag)
+
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
@@ -36,8 +39,6 @@ def topics(bag: Path, /) -> None:
     from semgp.logs.frames import NS
     from semgp.logs.poses import frames_of
 
-    if not bag.exists():
-        raise InputError(f"{bag}: no such file or folder.")
     if not is_bag(bag):
         raise InputError(
             f"{bag} is no robot log: give a .bag, .mcap or .db3 file, or a folder with metadata.yaml."

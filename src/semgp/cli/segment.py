@@ -8,6 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from semgp.cli.places import require_place
+
 
 def segment(
     images: list[Path],
@@ -50,6 +52,8 @@ def segment(
     overwrite
         Label images again that have labels in the folder.
     """
+    require_place(model)
+
     from semgp.class_files import class_list, remapping
     from semgp.cli.console import counted, keeping, progress, report
     from semgp.segmentation import images_of, segmenter_of

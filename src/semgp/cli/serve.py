@@ -9,6 +9,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from semgp.cli.places import require_place
+
 
 def serve(
     location: str,
@@ -18,6 +20,9 @@ def serve(
     port: int = 8000,
     token_file: Path | None = None,
     read_only: Annotated[bool, Parameter(negative="")] = False,
+    keep: int | None = None,
+    only_writer: Annotated[bool, Parameter(negative="")] = False,
+    poll: float = 5.0,
     points: int = 1_000_000,
     megabytes: int = 64,
     timeout: float = 60.0,
@@ -41,6 +46,13 @@ def serve(
         A file with the token that callers must have; left out, the environment's SEMGP_TOKEN.
     read_only
         Take no updates.
+    keep
+        Versions that stay; of the older ones, those that the service has made are dropped as it goes. 0 keeps all;
+        left out, 20 in a folder, all in a bucket.
+    only_writer
+        Nobody else writes to this map while it is served: only so can --keep be for a bucket.
+    poll
+        Seconds from one look for versions that others have made to the next; 0 for never.
     points
         The most points of a query.
     megabytes
@@ -50,6 +62,8 @@ def serve(
     sites
         Sites of a stored map that are kept in memory, for queries and again for updates.
     """
+    require_place(Path(location))
+
     from semgp.cli.console import MANNERS, STDERR, progress, report
     from semgp.service.limits import Limits
     from semgp.service.server import require_serve
@@ -62,7 +76,15 @@ def serve(
     limits = Limits(most_points=points, most_bytes=megabytes << 20, seconds=timeout)
     with progress() as bars:
         bars.add_task("opening the map", total=None)
-        service = Service(location, limits, most_sites=MOST_SITES if sites is None else sites, read_only=read_only)
+        service = Service(
+            location,
+            limits,
+            most_sites=MOST_SITES if sites is None else sites,
+            read_only=read_only,
+            keep=keep,
+            only_writer=only_writer,
+            poll=poll,
+        )
 
     def started(url: str) -> None:
         words = "queries and updates" if service.writer is not None else "queries, read-only"

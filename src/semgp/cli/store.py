@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from cyclopts import App
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from semgp.cli.console import counted, progress, report
+from semgp.cli.places import require_place
 from semgp.errors import FileFormatError
-from semgp.store import MapStore
 
 store_app = App(name="store", help="List, check, roll back and prune the versions of a stored map.")
 
@@ -26,6 +24,13 @@ def versions(place: Path, /) -> None:
     place
         The store's folder or URL.
     """
+    require_place(place)
+
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from semgp.store import MapStore
+
     store = MapStore(place)
     store.manifest()  # says so where there is none
     table = Table("version", "time", "scans", "sites", "tiles", "MB", "note", box=SIMPLE_HEAD)
@@ -58,8 +63,15 @@ def rollback(place: Path, /, *, to: int, note: str = "") -> None:
     note
         What to say of the new one.
     """
-    manifest = MapStore(place).roll_back(to, note)
-    report(f"{place}: version {manifest.number} is version {to} again", version=manifest.number, same_as=to)
+    require_place(place)
+
+    from semgp.store import MapStore
+
+    store = MapStore(place)
+    manifest = store.roll_back(to, note)
+    report(
+        f"{store.location}: version {manifest.number} is version {to} again", version=manifest.number, same_as=to
+    )
 
 
 @store_app.command
@@ -75,11 +87,16 @@ def prune(place: Path, /, *, keep: int) -> None:
     keep
         How many versions stay.
     """
+    require_place(place)
+
+    from semgp.store import MapStore
+
     store = MapStore(place)
     store.manifest()
     gone = store.prune(keep)
     report(
-        f"{place}: {counted(len(store.numbers()), 'version')}, {counted(gone, 'file')} removed", files_removed=gone
+        f"{store.location}: {counted(len(store.numbers()), 'version')}, {counted(gone, 'file')} removed",
+        files_removed=gone,
     )
 
 
@@ -96,6 +113,10 @@ def check(place: Path, /, *, version: int | None = None) -> None:
     version
         Number of the version; the newest by default.
     """
+    require_place(place)
+
+    from semgp.store import MapStore
+
     store = MapStore(place)
     manifest = store.manifest(version)
     with progress() as bars:
@@ -109,7 +130,7 @@ def check(place: Path, /, *, version: int | None = None) -> None:
             + "\nAn older version may be whole: `semgp store versions`, `semgp store rollback`.",
         )
     report(
-        f"{place}: all {len(manifest.tiles):,} tiles of version {manifest.number} are whole",
+        f"{store.location}: all {len(manifest.tiles):,} tiles of version {manifest.number} are whole",
         tiles=len(manifest.tiles),
     )
 
@@ -127,5 +148,10 @@ def clean(place: Path, /, *, older_than: float = 24.0) -> None:
     older_than
         Hours: files younger than that may belong to a writer at work.
     """
-    gone = MapStore(place).clean(3600 * older_than)
-    report(f"{place}: {counted(gone, 'file')} removed", files_removed=gone)
+    require_place(place)
+
+    from semgp.store import MapStore
+
+    store = MapStore(place)
+    gone = store.clean(3600 * older_than)
+    report(f"{store.location}: {counted(gone, 'file')} removed", files_removed=gone)

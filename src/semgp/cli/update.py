@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
-from rich.progress import Progress
 
 from semgp.cli.console import counted, keeping, progress, report
 from semgp.cli.inputs import PLAIN, AnyInputs, sources, tell_labels
+from semgp.cli.places import require_place
 from semgp.errors import InputError
-from semgp.executors import open_executor
-from semgp.maps.files import load_map, save_map
-from semgp.maps.gp import GPSemanticMap
-from semgp.maps.protocol import SerialisableMap
-from semgp.readers import Scans
-from semgp.store import BATCH, MapStore, StoredMap
-from semgp.store import build as build_stored
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from semgp.maps.protocol import SerialisableMap
+    from semgp.readers import Scans
+    from semgp.store import MapStore
 
 Workers = Annotated[Literal["threads", "ray"], Parameter(group="Many machines")]
 Address = Annotated[str | None, Parameter(group="Many machines")]
@@ -60,6 +60,13 @@ def update(
     address
         Address of a Ray cluster, "auto" for the one this machine belongs to; left out, one is started here.
     """
+    require_place(map_place, *scans)
+
+    from semgp.cli.describe import elements
+    from semgp.maps.files import load_map, save_map
+    from semgp.maps.protocol import SerialisableMap
+    from semgp.store import StoredMap
+
     clouds = sources(scans, inputs)
     semantic_map = load_map(map_place)
     if isinstance(semantic_map, StoredMap):
@@ -73,12 +80,14 @@ def update(
         fill(semantic_map, clouds, bars)
     tell_labels(clouds)
     save_map(semantic_map, map_place)
-    n = len(semantic_map)
-    report(f"{map_place}: {n:,} elements with {counted(len(clouds), 'scan')} more", out=map_place, elements=n)
+    words = f"{map_place}: {elements(semantic_map)} with {counted(len(clouds), 'scan')} more"
+    report(words, out=map_place, elements=len(semantic_map))
 
 
 def fill(semantic_map: SerialisableMap, clouds: Scans, bars: Progress) -> None:
     """Update a map in memory with all clouds."""
+    from semgp.maps.gp import GPSemanticMap
+
     for cloud in bars.track(clouds, description="building the map"):
         semantic_map.update(cloud)
     if not len(semantic_map):
@@ -94,13 +103,17 @@ def update_store(
 
     For a build, `done` is how many of them it holds already; None for an update.
     """
+    from semgp.executors import open_executor
+    from semgp.store import MapStore
+    from semgp.store import build as build_stored
+
     store = MapStore(place)
     begun = store.manifest()
     left, note = clouds[done or 0 :], "" if done is None else BUILDING
 
     def kept() -> str:
         manifest = store.manifest()
-        words = f"{place} holds version {manifest.number} with {manifest.clouds} scans"
+        words = f"{store.location} holds version {manifest.number} with {manifest.clouds} scans"
         if done is not None:
             return f"{words}; --resume goes on from there"
         new = manifest.clouds - begun.clouds
@@ -116,16 +129,20 @@ def update_store(
     tell_labels(clouds)
     manifest = store.manifest()
     if not manifest.sites:
-        raise InputError(f"no scan has a label: {place} holds an empty map. {WHERE_LABELS}")
+        raise InputError(f"no scan has a label: {store.location} holds an empty map. {WHERE_LABELS}")
     report(
-        f"{place}: version {manifest.number}, {manifest.sites:,} sites from {counted(manifest.clouds, 'scan')} in "
-        f"{counted(len(manifest.tiles), 'tile')}, {manifest.n_bytes / 1e6:.1f} MB",
-        out=place, version=manifest.number, sites=manifest.sites, scans=manifest.clouds, bytes=manifest.n_bytes,
+        f"{store.location}: version {manifest.number}, {manifest.sites:,} sites from "
+        f"{counted(manifest.clouds, 'scan')} in {counted(len(manifest.tiles), 'tile')}, "
+        f"{manifest.n_bytes / 1e6:.1f} MB",
+        out=store.location, version=manifest.number, sites=manifest.sites, scans=manifest.clouds,
+        bytes=manifest.n_bytes,
     )  # fmt: skip
 
 
 def _update_in_order(store: MapStore, clouds: Scans, note: str, bars: Progress) -> None:
     """Add clouds one after the other, to a map that forgets."""
+    from semgp.store import BATCH, StoredMap
+
     with StoredMap(store) as stored:
         for i, cloud in enumerate(bars.track(clouds, description="building the map"), 1):
             stored.update(cloud)

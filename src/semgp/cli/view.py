@@ -13,15 +13,14 @@ from cyclopts import Parameter
 
 from semgp.cli.console import progress, report
 from semgp.cli.inputs import PLAIN, AnyInputs, Upward, sources
+from semgp.cli.places import require_place
 from semgp.errors import InputError
-from semgp.maps.files import load_map
-from semgp.maps.presets import PRESETS, with_vertical
-from semgp.upward import Up, vertical
 
 if TYPE_CHECKING:
     from semgp.cloud import LabelledCloud
     from semgp.maps.protocol import SemanticMap, SpatialMap
     from semgp.surfaces.mesh import Mesh
+    from semgp.upward import Up
     from semgp.viewer.layers import Layer
     from semgp.viewer.playback import Playback
 
@@ -97,12 +96,14 @@ def view(
     """
     if not play and len(what) != 1:
         raise InputError("give one map; to see one built from scans, add --play.")
+    require_place(*what)
     name, hidden = title or what[0].stem, hide or ()
     if html is not None:
         if play or cloud or octomap or mesh:
             raise InputError("a page shows the map alone: --html goes without --play, --cloud, --octomap, --mesh.")
         _write(what[0], html, name, round(1e6 * megabytes), by=by, hide=hidden, resolution=resolution, up=up)
         return
+    from semgp.maps.files import load_map
     from semgp.viewer.live import LiveViewer
 
     with progress() as bars:
@@ -139,6 +140,7 @@ def _write(
     resolution: float | None,
     up: Up | None,
 ) -> None:
+    from semgp.maps.files import load_map
     from semgp.viewer.page import write_page
 
     with progress() as bars:
@@ -161,6 +163,7 @@ def _layers(
     source: SemanticMap | Playback, clouds: Sequence[LabelledCloud], octomap: Path | None, most: int
 ) -> list[Layer]:
     """Return what is shown beside the map: free space where it has any, clouds and cubes where they are given."""
+    from semgp.maps.files import load_map
     from semgp.viewer.layers import cloud_layer, free_layer, octomap_layer
     from semgp.viewer.playback import Playback
     from semgp.viewer.surface import Surface
@@ -188,6 +191,8 @@ def _mesh(source: SemanticMap | Playback) -> Mesh:
 
 def _playback(scans: list[Path], inputs: AnyInputs, model: str, up: Up | None) -> Playback:
     from semgp.maps.gp import GPSemanticMap
+    from semgp.maps.presets import PRESETS, with_vertical
+    from semgp.upward import vertical
     from semgp.viewer.playback import Playback
 
     if model not in PRESETS:

@@ -92,6 +92,17 @@ def nll(probability: ArrayLike, truth: ArrayLike) -> float:
     return float(-np.log(np.maximum(p_true, FLOOR)).mean()) if len(y) else float("nan")
 
 
+def probability_of_truth(probability: ArrayLike, truth: ArrayLike) -> NDArray[np.float64]:
+    """Return the mean probability (C,) that each class has at its own points; NaN for absent classes.
+
+    Parameters and errors as `reliability`.
+    """
+    p, y = probabilities(probability, truth)
+    count = np.bincount(y, minlength=p.shape[1])
+    total = np.bincount(y, weights=p[np.arange(len(y)), y], minlength=p.shape[1])
+    return np.asarray(np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0))
+
+
 def brier(probability: ArrayLike, truth: ArrayLike) -> float:
     """Return the mean of sum_c (p_c - y_c)^2, with y the true class as a one-hot vector: from 0 to 2.
 

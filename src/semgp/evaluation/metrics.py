@@ -1,4 +1,4 @@
-"""How often the labels are right: accuracy and intersection over union."""
+"""How often the labels are right: accuracy, precision, recall and intersection over union."""
 
 from __future__ import annotations
 
@@ -51,6 +51,20 @@ def iou(confusion: NDArray[np.int64]) -> NDArray[np.float64]:
     An answer withheld misses its true class and is no false alarm for another.
     """
     hit = confusion.diagonal()
-    present = confusion.sum(axis=1) > 0
-    union = confusion.sum(axis=1) + confusion[:, :-1].sum(axis=0) - hit
-    return np.asarray(np.divide(hit, union, out=np.full(len(hit), np.nan), where=present))
+    points = confusion.sum(axis=1)
+    union = points + confusion[:, :-1].sum(axis=0) - hit
+    return _shares(hit, np.where(points > 0, union, 0))
+
+
+def recall(confusion: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the share (C,) of each class's points whose label is right; NaN for classes absent from the truth."""
+    return _shares(confusion.diagonal(), confusion.sum(axis=1))
+
+
+def precision(confusion: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the share (C,) of the points given each label that have it in truth; NaN for labels not given."""
+    return _shares(confusion.diagonal(), confusion[:, :-1].sum(axis=0))
+
+
+def _shares(part: NDArray[np.int64], whole: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.asarray(np.divide(part, whole, out=np.full(len(part), np.nan), where=whole > 0))

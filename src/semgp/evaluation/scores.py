@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgp.classes import MISSING
 from semgp.errors import InputError
 from semgp.evaluation.auc import hand_till, mean_of_known, one_vs_rest, pair_wins
-from semgp.evaluation.calibration import Reliability, brier, nll, reliability
+from semgp.evaluation.calibration import Reliability, brier, nll, probability_of_truth, reliability
 from semgp.evaluation.checks import probabilities
 from semgp.evaluation.metrics import accuracy, confusion, iou
 
@@ -39,6 +39,10 @@ class Scores:
         Intersection over union of each class; NaN for absent classes.
     miou : float
         Mean of `iou` over the classes present.
+    confusion : (C, C + 1) integer array
+        Points by true class (row) and label given (column); in the last column those not observed.
+    probability_of_truth : (C,) array
+        Mean probability of each class at its own points; NaN for absent classes.
     nll : float
         Mean log-loss in nats, probabilities floored at 1e-6.
     brier : float
@@ -59,6 +63,8 @@ class Scores:
     accuracy: float
     iou: NDArray[np.float64]
     miou: float
+    confusion: NDArray[np.int64]
+    probability_of_truth: NDArray[np.float64]
     nll: float
     brier: float
     ece: float
@@ -66,7 +72,7 @@ class Scores:
     on_observed: Scores | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return everything but the diagram as plain numbers, lists and None (for NaN)."""
+        """Return all but confusion, `probability_of_truth` and diagram as numbers, lists and None (for NaN)."""
         plain: dict[str, Any] = {"n_points": self.n_points}
         for name in ("coverage", "auc_total", "auc_hand_till", "accuracy", "miou", "nll", "brier", "ece"):
             plain[name] = _number(getattr(self, name))
@@ -124,6 +130,8 @@ def _scores(p: NDArray[np.floating], seen: NDArray[np.bool_], y: NDArray[np.int6
         accuracy=accuracy(table),
         iou=overlap,
         miou=mean_of_known(overlap),
+        confusion=table,
+        probability_of_truth=probability_of_truth(p, y),
         nll=nll(p, y),
         brier=brier(p, y),
         ece=diagram.ece,

@@ -21,12 +21,12 @@ S = TypeVar("S")
 _RETRIES = 10
 _PATIENCE = 10.0  # seconds for a cluster to answer: Ray itself would try for ten minutes
 
-_EVERYWHERE = {
+EVERYWHERE = {
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",  # under `uv run` workers would get an environment of their own
     "RAY_USAGE_STATS_ENABLED": "0",  # no request leaves the machine
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # no warning of changes to come
 }
-_ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}  # not a cluster: its ports are on loopback only
+ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}  # not a cluster: its ports are on loopback only
 
 
 class RayExecutor:
@@ -52,7 +52,7 @@ class RayExecutor:
     def __init__(self, workers: int | None = None, address: str | None = None) -> None:
         if workers is not None and (workers < 1 or address is not None):
             raise InputError("workers must be at least 1, and are not for a cluster that is there already.")
-        for name, value in (_EVERYWHERE | (_ALONE if address is None else {})).items():
+        for name, value in (EVERYWHERE | (ALONE if address is None else {})).items():
             os.environ.setdefault(name, value)  # Ray reads them when it is imported or started
         try:
             import ray

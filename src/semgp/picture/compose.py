@@ -6,12 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from semgp.classes import Classes
 from semgp.errors import InputError
 from semgp.picture.colour import GREY, by_value
 from semgp.picture.image import Colour, Picture, checked_picture
+from semgp.picture.lettering import blank, font, ink, write
 from semgp.picture.splat import WHITE
 
 
@@ -56,14 +57,14 @@ def panels(
     cell_height = max(len(p) for p in pictures) + head + gap
     cell_width = max(p.shape[1] for p in pictures) + gap
     rows = math.ceil(len(pictures) / columns)
-    page = _page(rows * cell_height + gap, columns * cell_width + gap, background)
+    page = blank(rows * cell_height + gap, columns * cell_width + gap, background)
     for i, picture in enumerate(pictures):
         left, top = gap + i % columns * cell_width, gap + i // columns * cell_height
         inset = (cell_width - gap - picture.shape[1]) // 2
         page.paste(Image.fromarray(picture), (left + inset, top + head))
         if titles is not None:
             middle = (left + (cell_width - gap) / 2, top + 0.7 * font_size)
-            _write(page, middle, titles[i], font_size, background, anchor="mm")
+            write(page, middle, titles[i], font_size, background, anchor="mm")
     return np.asarray(page)
 
 
@@ -79,7 +80,7 @@ def stack(images: Sequence[Picture], *, background: Colour = WHITE) -> Picture:
     if not pictures:
         raise InputError("a stack needs at least one picture.")
     width = max(p.shape[1] for p in pictures)
-    page = _page(sum(len(p) for p in pictures), width, background)
+    page = blank(sum(len(p) for p in pictures), width, background)
     top = 0
     for picture in pictures:
         page.paste(Image.fromarray(picture), ((width - picture.shape[1]) // 2, top))
@@ -120,13 +121,13 @@ def legend(
     rows = math.ceil(len(entries) / fitting)
     columns = math.ceil(len(entries) / rows)
     full = columns * column + 2 * margin
-    page = _page(rows * line + margin, full if width is None else max(width, full), background)
+    page = blank(rows * line + margin, full if width is None else max(width, full), background)
     draw = ImageDraw.Draw(page)
     first = (page.width - columns * column + swatch) // 2
     for i, (name, colour) in enumerate(entries):
         x, y = first + i % columns * column, margin // 2 + i // columns * line + (line - swatch) // 2
         draw.rounded_rectangle((x, y, x + swatch, y + swatch), radius=swatch // 5, fill=colour)
-        _write(page, (x + 1.5 * swatch, y + swatch / 2), name, font_size, background, anchor="lm")
+        write(page, (x + 1.5 * swatch, y + swatch / 2), name, font_size, background, anchor="lm")
     return np.asarray(page)
 
 
@@ -169,7 +170,7 @@ def colour_bar(
     if length < 2:
         raise InputError(f"a colour bar with letters of {font_size} pixels needs a width above {2 * margin}.")
     top = round(1.8 * font_size) if title else font_size // 2
-    page = _page(top + thick + 2 * font_size, width, background)
+    page = blank(top + thick + 2 * font_size, width, background)
     bar = by_value(np.linspace(low, high, length), low, high, colour_map)
     page.paste(Image.fromarray(np.repeat(bar[None], thick, axis=0)), (margin, top))
     draw = ImageDraw.Draw(page)
@@ -177,15 +178,15 @@ def colour_bar(
     for value in _ticks(low, high, max(2, length // (4 * font_size))):
         x = margin + round((value - low) / (high - low) * (length - 1))
         draw.line((x, top + thick, x, top + thick + font_size // 4), fill=colour, width=max(1, font_size // 12))
-        _write(page, (x, top + thick + 1.1 * font_size), f"{value:g}", font_size, background, anchor="mm")
-    _write(page, (width / 2, 0.9 * font_size), title, font_size, background, anchor="mm")
+        write(page, (x, top + thick + 1.1 * font_size), f"{value:g}", font_size, background, anchor="mm")
+    write(page, (width / 2, 0.9 * font_size), title, font_size, background, anchor="mm")
     return np.asarray(page)
 
 
 def heading(text: str, width: int, *, font_size: int = 24, background: Colour = WHITE) -> Picture:
     """Return a line of text on a ground of so many pixels' width."""
-    page = _page(2 * font_size, width, background)
-    _write(page, (width / 2, 1.1 * font_size), text, font_size, background, anchor="mm")
+    page = blank(2 * font_size, width, background)
+    write(page, (width / 2, 1.1 * font_size), text, font_size, background, anchor="mm")
     return np.asarray(page)
 
 
@@ -196,25 +197,3 @@ def _ticks(low: float, high: float, most: int) -> list[float]:
     step = next(m * power for m in (1, 2, 5, 10) if m * power >= rough * (1 - 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
-
-
-def _page(height: int, width: int, background: Colour) -> Image.Image:
-    return Image.new("RGB", (width, height), background)
-
-
-def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """Return the font of all that is written, with letters of so many pixels."""
-    return ImageFont.load_default(size)
-
-
-def ink(background: Colour) -> Colour:
-    """Return a text colour that reads well: near black on light, near white on dark."""
-    red, green, blue = background
-    return (34, 34, 38) if 0.299 * red + 0.587 * green + 0.114 * blue > 128 else (236, 236, 236)
-
-
-def _write(
-    page: Image.Image, at: tuple[float, float], text: str, size: int, background: Colour, anchor: str
-) -> None:
-    """Write a line of text, `at` its middle (anchor "mm") or the middle of its left end ("lm")."""
-    ImageDraw.Draw(page).text(at, text, ink(background), font(size), anchor=anchor)

@@ -1,8 +1,14 @@
-"""Points that cover what a map has seen, as densely as a picture needs them."""
+"""Points that cover what a map has seen, as densely as a picture needs them.
+
+The viewer (`semgp.viewer.surface`) lays its points on the same discs, but thins them, because it cannot show too
+many, and leaves the discs where the data are: who clicks wants to know what the map says there.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,43 +76,109 @@ def surface_points(positions: F64, resolution: float) -> F64:
     InputError
         No positions, or a resolution that is not positive.
     """
-    if not (math.isfinite(resolution) and resolution > 0):
-        raise InputError(f"the resolution must be a positive number of metres, not {resolution}.")
+    require_resolution(resolution)
     if not len(positions):
         raise InputError("the map is empty: build it from scans with labels.")
     spacing = spacing_of(positions)
     if 2 * spacing <= resolution or len(positions) < _NEIGHBOURS:
-        return _thinned(positions, resolution)
-    return _filled(positions, resolution, _LONGEST * spacing)
+        return thinned(positions, resolution)
+    planes = Planes.through(positions, _NEIGHBOURS)
+    return Discs.of(planes.onto(positions), planes, spacing).points(resolution, _FINEST)
 
 
-def _thinned(positions: F64, resolution: float) -> F64:
-    """Return the means of the positions in each voxel."""
-    keys = voxel_keys(positions, resolution, voxel_origin(positions, resolution))
+def require_resolution(resolution: float) -> None:
+    """Raise an InputError unless a resolution is positive."""
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise InputError(f"the resolution must be a positive number of metres, not {resolution}.")
+
+
+def thinned(points: F64, resolution: float) -> F64:
+    """Return the mean (M, 3) of the points in each voxel with this edge, in the order of the voxels."""
+    keys = voxel_keys(points, resolution, voxel_origin(points, resolution))
     _, voxel, count = np.unique(keys, return_inverse=True, return_counts=True)
-    corner = positions.min(axis=0)
-    sums = [np.bincount(voxel, along) for along in (positions - corner).T]
-    return np.asarray(corner + np.stack(sums, axis=1) / count[:, None])
+    sums = [np.bincount(voxel, along) for along in (points - points[0]).T]  # small: UTM keeps its millimetres
+    return np.asarray(points[0] + np.stack(sums, axis=1) / count[:, None])
 
 
-def _filled(positions: F64, resolution: float, longest: float) -> F64:
-    """Return discs of points in the planes of the positions' neighbours, as wide as their distances."""
-    distance, neighbour = cKDTree(positions).query(positions, k=_NEIGHBOURS, workers=n_workers())
-    middle = positions[neighbour].mean(axis=1)
-    around = positions[neighbour] - middle[:, None]
-    _, axes = np.linalg.eigh(np.swapaxes(around, 1, 2) @ around)
-    normal = axes[:, :, 0]
-    smooth = positions + normal * np.einsum("ni,ni->n", middle - positions, normal)[:, None]
-    radius = np.minimum(_DISC * distance[:, 5], longest)
-    n = np.clip(np.ceil(2 * radius / resolution), 1, _FINEST).astype(int)
-    parts = [_discs(smooth[n == k], radius[n == k], axes[n == k], k) for k in np.unique(n)]
-    return np.concatenate(parts)
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """A surface as discs: one a datum, in the plane of its neighbours, as wide as their distances.
+
+    Parameters
+    ----------
+    centres : (n, 3) array
+        Metres.
+    radius : (n,) array
+        Metres.
+    axes : (n, 2, 3) array
+        Two unit vectors each that span the plane.
+    """
+
+    centres: F64
+    radius: F64
+    axes: F64
+
+    @classmethod
+    def of(cls, centres: F64, planes: Planes, spacing: float) -> Self:
+        """Return discs around centres (n, 3) in planes through them, of data that are usually so far apart."""
+        radius = np.minimum(_DISC * planes.distance[:, :6][:, -1], _LONGEST * spacing)
+        return cls(centres, radius, planes.axes[:, 1:])
+
+    def across(self, resolution: float, most: int | None = None) -> NDArray[np.int64]:
+        """Return how many points from side to side (n,) each disc has, at the resolution or at `most` so many."""
+        return np.clip(np.ceil(2 * self.radius / resolution), 1, most).astype(np.int64)
+
+    def points(self, resolution: float, most: int | None = None) -> F64:
+        """Return points (M, 3) on the discs, about a resolution apart, of each at most `most` by `most`."""
+        n = self.across(resolution, most)
+        parts = [
+            _grids(self.centres[n == k], self.radius[n == k], self.axes[n == k], int(k)) for k in np.unique(n)
+        ]
+        return np.concatenate(parts)
 
 
-def _discs(centres: F64, radius: F64, axes: F64, n: int) -> F64:
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """Planes through the nearest neighbours of each datum, itself included.
+
+    Parameters
+    ----------
+    distance : (n, k) array
+        From the datum, rising, metres.
+    middle : (n, 3) array
+        Their mean, metres.
+    spread : (n, 3) array
+        Sums of squares along the axes, rising, square metres.
+    axes : (n, 3, 3) array
+        Unit vectors, the normal of the plane first.
+    """
+
+    distance: F64
+    middle: F64
+    spread: F64
+    axes: F64
+
+    @classmethod
+    def through(cls, positions: F64, k: int) -> Self:
+        """Return the planes through `k` neighbours of each position (n, 3), or all there are."""
+        k = min(k, len(positions))
+        distance, neighbour = cKDTree(positions).query(positions, k=range(1, k + 1), workers=n_workers())
+        near = positions[neighbour]
+        middle = near.mean(axis=1)
+        apart = near - middle[:, None]
+        spread, axes = np.linalg.eigh(np.swapaxes(apart, 1, 2) @ apart)
+        return cls(distance, middle, spread, np.swapaxes(axes, 1, 2))
+
+    def onto(self, positions: F64) -> F64:
+        """Return positions (n, 3) moved onto their planes: without noise, but rounded at corners."""
+        normal = self.axes[:, 0]
+        return np.asarray(positions + normal * np.einsum("ni,ni->n", self.middle - positions, normal)[:, None])
+
+
+def _grids(centres: F64, radius: F64, axes: F64, n: int) -> F64:
     """Return the points of a grid of n x n that lie in a disc around each centre."""
     steps = (2 * np.arange(n) + 1) / n - 1
     a, b = (v.ravel() for v in np.meshgrid(steps, steps))
     disc = np.flatnonzero(a**2 + b**2 <= 1)
-    across = a[disc, None] * axes[:, None, :, 2] + b[disc, None] * axes[:, None, :, 1]
+    across = a[disc, None] * axes[:, None, 1] + b[disc, None] * axes[:, None, 0]
     return np.asarray((centres[:, None] + radius[:, None, None] * across).reshape(-1, 3))

@@ -14,8 +14,9 @@ from semgp.classes import MISSING, Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import InputError
 from semgp.picture.camera import below_mask
-from semgp.picture.compose import colour_bar, font, heading, ink, legend, panels, stack
+from semgp.picture.compose import colour_bar, heading, legend, panels, stack
 from semgp.picture.image import Colour, Picture
+from semgp.picture.lettering import font, ink
 from semgp.picture.paint import Bar, Paint, paint, paint_labels
 from semgp.picture.splat import WHITE, disc_sizes, splat
 from semgp.picture.view import View

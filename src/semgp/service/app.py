@@ -112,7 +112,7 @@ def create_app(service: Service, token: str | None = None) -> ASGIApp:
     async def info() -> Response:
         """What the map is, and what the service allows."""
         described = await answer(reader.ask(lambda semantic_map: semantic_map.info()))
-        return JSONResponse({"colours": reader.classes.colours, **described, **service.facts()})
+        return JSONResponse({"colours": reader.classes.colours, **service.facts(), **described})
 
     @app.get("/healthz")
     async def healthz() -> dict[str, str]:

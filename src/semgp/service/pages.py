@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from semgp.errors import InputError
+from semgp.errors import ConflictError, InputError
 from semgp.service.service import Service
 
 MOST_SITES = 2_000_000
@@ -33,7 +33,7 @@ class Pages:
     def __init__(self, service: Service) -> None:
         self._service = service
         self._thread = ThreadPoolExecutor(1, "semgp-page")
-        self._coming: tuple[int, Future[str]] | None = None
+        self._coming: Future[tuple[int, str]] | None = None
         self._made: tuple[int, str] | None = None
         self._closing = False
 
@@ -42,12 +42,10 @@ class Pages:
 
         Of a version without a page, one is begun. Only for the thread of the event loop.
         """
-        if self._coming is not None and self._coming[1].done():
-            (version, coming), self._coming = self._coming, None
-            self._made = version, coming.result()
-        version = self._service.reader.version
-        if self._coming is None and (self._made is None or self._made[0] != version):
-            self._coming = version, self._thread.submit(self._page, version)
+        if self._coming is not None and self._coming.done():
+            self._made, self._coming = self._coming.result(), None
+        if self._coming is None and (self._made is None or self._made[0] != self._service.reader.version):
+            self._coming = self._thread.submit(self._page)
         return self._made
 
     def close(self) -> None:
@@ -55,19 +53,20 @@ class Pages:
         self._closing = True
         self._thread.shutdown(cancel_futures=True)
 
-    def _page(self, version: int) -> str:
+    def _page(self) -> tuple[int, str]:
         from semgp.viewer import page
 
+        version = self._service.reader.version
         try:
-            semantic_map = self._service.open_version(version)
-            if len(semantic_map) > MOST_SITES:
-                raise InputError(
-                    f"the map has {len(semantic_map):,} sites, too many for a page: use `semgp view`."
-                )
-            title = f"{self._service.name}, version {version}"
-            return page(semantic_map, title=title, most_bytes=PAGE_BYTES, progress=self._go_on_or_end)
-        except InputError as error:
-            return plain_page("No picture", f"<p>{html.escape(str(error))}</p><p>{LINKS}</p>")
+            with self._service.view() as (version, semantic_map):
+                if len(semantic_map) > MOST_SITES:
+                    raise InputError(
+                        f"the map has {len(semantic_map):,} sites, too many for a page: use `semgp view`."
+                    )
+                title = f"{self._service.name}, version {version}"
+                return version, page(semantic_map, title=title, most_bytes=PAGE_BYTES, progress=self._go_on_or_end)
+        except (InputError, ConflictError) as error:
+            return version, plain_page("No picture", f"<p>{html.escape(str(error))}</p><p>{LINKS}</p>")
 
     def _go_on_or_end(self, *_: int) -> None:
         if self._closing:

@@ -11,6 +11,7 @@ from typing import TypeVar
 from numpy.typing import ArrayLike
 
 from semgp.classes import Classes
+from semgp.errors import ConflictError
 from semgp.maps.protocol import SemanticMap
 from semgp.prediction import Prediction
 from semgp.service.metrics import Metrics
@@ -56,7 +57,11 @@ class Reader:
 
         def turn() -> T:
             self._catch_up()
-            return question(self._map)
+            try:
+                return question(self._map)
+            except ConflictError:  # another process has removed the version before we have gone on
+                self._go_on()
+                return question(self._map)
 
         return self._thread.submit(turn)
 
@@ -76,13 +81,17 @@ class Reader:
         while not self._refreshes.empty():
             future, start = self._refreshes.get(), time.perf_counter()
             try:
-                if isinstance(self._map, StoredMap):
-                    self._map.refresh()
-                self.version = self._present()
+                self._go_on()
                 future.set_result(self.version)
             except Exception as error:
                 future.set_exception(error)
             self._metrics.time("semgp_refresh_seconds", time.perf_counter() - start)
+
+    def _go_on(self) -> None:
+        """Go on with the newest version."""
+        if isinstance(self._map, StoredMap):
+            self._map.refresh()
+        self.version = self._present()
 
     def _present(self) -> int:
         """The version, 1 for maps that have none."""

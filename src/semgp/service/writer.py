@@ -7,6 +7,7 @@ from threading import Condition, Thread
 
 from semgp.cloud import LabelledCloud
 from semgp.errors import ConflictError, FileFormatError, InputError, SemgpError
+from semgp.service.keeping import Keeper, note
 from semgp.service.limits import BusyError
 from semgp.service.metrics import Metrics
 from semgp.service.reader import Reader
@@ -27,6 +28,8 @@ class Writer:
         Where the map is.
     reader : Reader
         Who answers from it.
+    keeper : Keeper
+        Who drops old versions, between two that are made.
     metrics : Metrics
         Where the clouds are counted.
     most_sites : int
@@ -36,9 +39,15 @@ class Writer:
     """
 
     def __init__(
-        self, store: MapStore, reader: Reader, metrics: Metrics, most_sites: int, most_waiting: int
+        self,
+        store: MapStore,
+        reader: Reader,
+        keeper: Keeper,
+        metrics: Metrics,
+        most_sites: int,
+        most_waiting: int,
     ) -> None:
-        self._store, self._reader, self._metrics = store, reader, metrics
+        self._store, self._reader, self._keeper, self._metrics = store, reader, keeper, metrics
         self._most_sites, self._most_waiting = most_sites, most_waiting
         self._map: StoredMap | None = None
         self._waiting: list[Pending] = []
@@ -93,6 +102,7 @@ class Writer:
     def _run(self) -> None:
         while batch := self._next():
             self._take_in(batch)
+            self._keeper.drop()
 
     def _next(self) -> list[Pending]:
         with self._change:
@@ -140,7 +150,7 @@ class Writer:
 
     def _publish(self, clouds: int) -> int:
         assert self._map is not None
-        version = self._map.commit(f"{clouds} cloud{'s' * (clouds != 1)} by the service")
+        version = self._map.commit(note(clouds))
         try:
             self._reader.refresh().result()
         except SemgpError as error:

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.blocks.arrays import F64, I64
+from semgp.blocks.arrays import F64
 from semgp.errors import InputError
 from semgp.executors import Executor, Steps
 from semgp.executors.protocol import no_steps
 from semgp.maps.protocol import query_points
 from semgp.maps.settings import require_data
 from semgp.prediction import Prediction
-from semgp.store.groups import in_order
+from semgp.store.groups import groups, in_order
 from semgp.store.manifest import Manifest, Tile
 from semgp.store.store import MapStore
 from semgp.store.working_set import WorkingSet
-from semgp.voxels import voxel_indices, voxel_keys
 
 PIECE_SITES = 200_000
 """Sites that a piece of work loads at most, unless one tile's points need more: some hundred MB once solved."""
@@ -46,7 +44,7 @@ class AskTiles:
 
     def __call__(self, piece: Piece) -> Prediction:
         """Return the answers at the points of a piece."""
-        sites = sum(tile.sites + tile.free_sites for tile in piece.tiles.values())
+        sites = sum(tile.all_sites for tile in piece.tiles.values())
         working = WorkingSet(self.store, replace(self.manifest, tiles=piece.tiles), max(sites, 1))
         working.hold(np.array(list(piece.tiles), dtype=np.int64))
         return working.state.answer(piece.points, piece.features)
@@ -93,31 +91,11 @@ def query(
     manifest = store.manifest(version)
     require_data(manifest.sites + manifest.free_sites)
     all_rows, pieces = [], []
-    for rows, tiles in _pieces(X, manifest):
-        all_rows.append(rows)
+    sizes = {key: tile.all_sites for key, tile in manifest.tiles.items()}
+    origin = np.array(manifest.origin, dtype=np.int64)
+    for rows, near in groups(X, manifest.settings, origin, sizes, PIECE_SITES, PIECE_POINTS):
+        tiles = {key: manifest.tiles[key] for key in near.tolist() if key in manifest.tiles}
         pieces.append(Piece(X[rows], None if known is None else known[rows], tiles))
+        all_rows.append(rows)
     work = AskTiles(store, replace(manifest, tiles={}))
     return in_order(executor.map(work, pieces, steps), all_rows)
-
-
-def _pieces(X: F64, manifest: Manifest) -> Iterator[tuple[I64, dict[int, Tile]]]:
-    """Yield rows of points, each row once, and their tiles: boxes of tiles, halved until they are small enough."""
-    settings = manifest.settings
-    origin = np.array(manifest.origin, dtype=np.int64)
-    home = voxel_keys(X, settings.resolution, origin, allow_outside=True)
-    place = voxel_indices(settings.tiling.keys(home), origin)
-    left = [np.arange(len(X))]
-    while left:
-        rows = left.pop()
-        near = settings.tiling.round_points(X[rows], settings.resolution, origin, settings.half_blend).tolist()
-        tiles = {key: manifest.tiles[key] for key in near if key in manifest.tiles}
-        sites = sum(tile.sites + tile.free_sites for tile in tiles.values())
-        axis = int(np.argmax(np.ptp(place[rows], axis=0))) if len(rows) else 0
-        values = np.unique(place[rows, axis])
-        if len(values) > 1 and (sites > PIECE_SITES or len(rows) > PIECE_POINTS):
-            high = place[rows, axis] >= values[len(values) // 2]
-            left += [rows[high], rows[~high]]
-        elif len(rows) > PIECE_POINTS:
-            left += np.array_split(rows, 2)
-        else:
-            yield rows, tiles

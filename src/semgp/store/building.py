@@ -18,6 +18,7 @@ from semgp.executors import Executor, Steps
 from semgp.executors.protocol import no_steps
 from semgp.maps.protocol import require_classes
 from semgp.maps.tiles import Arrays, changed_tiles, cut
+from semgp.parallel import n_workers, parallel_map
 from semgp.store.manifest import Manifest, Tile, voxel
 from semgp.store.merge import added
 from semgp.store.settings import Settings
@@ -70,12 +71,14 @@ class WriteTiles:
                 f"{self.store.location}: a worker does not see version {self.manifest.number}. All machines must "
                 "reach the store by the same path or URL."
             )
-        settings, written = self.manifest.settings, {}
-        for tile in sorted({tile for part in parts for tile in part}):
-            old = self.manifest.tiles.get(tile)
-            before = [] if old is None else [self.store.get(tile, old, settings)]
-            written[tile] = self.store.put(tile, added([*before, *(part[tile] for part in parts if tile in part)]))
-        return written
+        tiles = sorted({tile for part in parts for tile in part})
+        at_once = max(1, self.store.files.at_once // n_workers())  # for each of the workers of this process
+        return dict(zip(tiles, parallel_map(lambda tile: self._write(tile, parts), tiles, at_once)))
+
+    def _write(self, tile: int, parts: list[Part]) -> Tile:
+        old = self.manifest.tiles.get(tile)
+        before = [] if old is None else [self.store.get(tile, old, self.manifest.settings)]
+        return self.store.put(tile, added([*before, *(part[tile] for part in parts if tile in part)]))
 
 
 def build(

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from semgp.errors import ConflictError
+from semgp.errors import ConflictError, FileFormatError
 from semgp.maps.tiles import Arrays
 from semgp.store.manifest import Manifest, Tile, voxel
 from semgp.store.merge import merged
 from semgp.store.store import MapStore
+from semgp.store.versions import following_of
 from semgp.store.working_set import WorkingSet
 
 _TRIES = 20
 
 
-def commit(working: WorkingSet, base: Manifest, clouds: int, note: str, merge: bool) -> Manifest:
-    """Publish a working set as the version after the one it is based on, and return its manifest.
+def commit(working: WorkingSet, clouds: int, note: str, merge: bool) -> None:
+    """Publish a working set as the version after the one it is based on, and go on from there.
 
     Parameters
     ----------
     working : WorkingSet
         With changes; they are written first.
-    base : Manifest
-        The version on which the changes are based.
     clouds : int
-        How many clouds they are from.
+        How many clouds the changes are from.
     note : str
         For the manifest.
     merge : bool
@@ -36,32 +33,54 @@ def commit(working: WorkingSet, base: Manifest, clouds: int, note: str, merge: b
     ------
     ConflictError
         Others have published and `merge` is False, or maps forget and have changed in the same tiles, or began at
-        different places. The working set keeps the changes.
+        different places; or the version that mine are based on has been removed, and is needed to add them up. The
+        working set keeps the changes.
     """
     working.write()
+    clouds -= _came_through(working)
+    if not clouds and working.tiles == working.base.tiles:
+        return
     for _ in range(_TRIES):
-        origin, clock = working.state.origin, working.state.clock
         mine = replace(
-            base,
-            clouds=base.clouds + clouds,
-            origin=voxel(origin),
-            clock=clock,
+            working.base,
+            clouds=working.base.clouds + clouds,
+            origin=voxel(working.state.origin),
+            clock=working.state.clock,
             tiles=dict(working.tiles),
         )
+        working.unanswered = following_of(mine, note)
         try:
-            return working.store.publish(mine, note)
+            working.store.add(working.unanswered)
+            working.base, working.unanswered = working.unanswered, None
+            return
         except ConflictError:
+            working.unanswered = None
             if not merge:
                 raise
         theirs = working.store.manifest()
-        tiles = _merged_tiles(working.store, base, mine, theirs)
-        start = mine.origin if theirs.origin is None else theirs.origin
-        clocks = [c for c in (clock, theirs.clock) if c is not None]
-        working.move_to(
-            tiles, None if start is None else np.array(start, dtype=np.int64), max(clocks) if clocks else None
+        clocks = [c for c in (mine.clock, theirs.clock) if c is not None]
+        both = replace(
+            theirs,
+            origin=mine.origin if theirs.origin is None else theirs.origin,
+            clock=max(clocks, default=None),
+            tiles=_merged_tiles(working.store, working.base, mine, theirs),
         )
-        base = theirs
+        working.move_to(both)
+        working.base = theirs  # what is added to it is still to be published
     raise ConflictError(f"{working.store.location}: other writers were faster {_TRIES} times: try again later.")
+
+
+def _came_through(working: WorkingSet) -> int:
+    """Go on from what an earlier try has published without an answer; return how many clouds that has."""
+    made, before = working.unanswered, working.base
+    if made is None:
+        return 0
+    there = working.store.has(made)
+    working.unanswered = None
+    if not there:
+        return 0
+    working.base = made
+    return made.clouds - before.clouds
 
 
 def _merged_tiles(store: MapStore, base: Manifest, mine: Manifest, theirs: Manifest) -> dict[int, Tile]:
@@ -86,7 +105,11 @@ def _both(store: MapStore, key: int, mine: Manifest, a: Tile | None, b: Tile | N
             f"{store.location}: another writer has changed the same places, and what two have forgotten cannot be "
             "added up: open the map anew, and update it again with what you have."
         )
-    before, one, other = (_arrays(store, key, mine, tile) for tile in (a, b, c))
+    try:
+        before, one, other = (_arrays(store, key, mine, tile) for tile in (a, b, c))
+    except FileFormatError:
+        store.require_still(mine.number)
+        raise
     return store.put(key, merged(before, one, other))
 
 

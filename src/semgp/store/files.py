@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from semgp.errors import FileFormatError, InputError
+from semgp.parallel import n_workers
 
 try:
     import fcntl
@@ -16,7 +17,7 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 _PARTIAL = ".partial-"
-_LOCK = "writers.lock"
+LOCK = "writers.lock"
 
 
 MOST_BYTES = 1 << 30
@@ -70,6 +71,11 @@ class Files(Protocol):
         """The folder's path or the bucket's URL, for error messages."""
         ...
 
+    @property
+    def at_once(self) -> int:
+        """How many files to read or write at a time: more than there are cores where one waits for a network."""
+        ...
+
     def read(self, name: str, most: int = MOST_BYTES) -> bytes:
         """Return what a file of so many bytes at most holds.
 
@@ -121,6 +127,11 @@ class LocalFiles:
     def location(self) -> str:
         """The folder's path."""
         return str(self.folder)
+
+    @property
+    def at_once(self) -> int:
+        """As many as there are cores."""
+        return n_workers()
 
     def read(self, name: str, most: int = MOST_BYTES) -> bytes:
         """Return what a file of so many bytes at most holds."""
@@ -196,7 +207,7 @@ class LocalFiles:
         """Take the writers' lock."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            return WritersLock(self.folder / _LOCK)
+            return WritersLock(self.folder / LOCK)
         except OSError as error:
             raise InputError(f"cannot write to {self.folder}: {error.strerror or error}.") from error
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from semgp.blocks.merging import joined, moved, stored_sums
+from semgp.blocks.arrays import F64
+from semgp.blocks.merging import Sums, joined, moved, stored_sums
 from semgp.checks import rigid_transform
 from semgp.errors import InputError
 from semgp.maps.fusion import require_same, require_same_classes
 from semgp.maps.tiles import Arrays, cut, every_tile
+from semgp.parallel import parallel_map
 from semgp.store.manifest import Manifest, Tile, voxel
 from semgp.store.map import StoredMap
 from semgp.store.merge import added
@@ -49,17 +52,15 @@ def fuse_stored(
     with store.writing():
         store.require_empty()
         keep = tuple(settings.new_state().fields)
-        tiles = {key: store.put(key, _only(arrays, keep)) for key, arrays in a.parts()}
-        origin = a.origin
-        for _, arrays in b.parts():
-            assert b.origin is not None
-            known = arrays | {prefix + "origin": b.origin for prefix in keep}
-            sums = {p: moved(stored_sums(known, p), T, b.resolution, a.resolution) for p in keep}
+        tiles = _copied(a, store, keep)
+        origin, parts = a.origin, b.parts()
+        while some := [arrays for _, arrays in islice(parts, store.files.at_once)]:
+            sums = [_moved(arrays, b, T, a.resolution, keep) for arrays in some]
             if origin is None:
-                origin = sums[""].origin
+                origin = sums[0][""].origin
             state = settings.new_state()
             for prefix, field in state.fields.items():
-                field.restore(joined([sums[prefix]], origin))
+                field.restore(joined([part[prefix] for part in sums], origin))
             _add(store, settings, tiles, cut(state, settings.tiling, every_tile(state, settings.tiling)))
         clouds = a.clouds + b.clouds
         fused = store.publish(Manifest(0, settings, "", origin=voxel(origin), tiles=tiles, clouds=clouds), note)
@@ -67,11 +68,30 @@ def fuse_stored(
     return fused
 
 
+def _moved(arrays: Arrays, b: StoredMap, T: F64, resolution: float, prefixes: tuple[str, ...]) -> dict[str, Sums]:
+    """The sums of a tile of b in the fused map's frame and voxels."""
+    assert b.origin is not None
+    known = arrays | {prefix + "origin": b.origin for prefix in prefixes}
+    return {prefix: moved(stored_sums(known, prefix), T, b.resolution, resolution) for prefix in prefixes}
+
+
 def _add(store: MapStore, settings: Settings, tiles: dict[int, Tile], parts: dict[int, Arrays]) -> None:
     """Add what some tiles are to have to their files."""
-    for key, arrays in parts.items():
+
+    def add(key: int) -> Tile:
         old = [store.get(key, tiles[key], settings)] if key in tiles else []
-        tiles[key] = store.put(key, added([*old, arrays]))
+        return store.put(key, added([*old, parts[key]]))
+
+    tiles |= dict(zip(parts, parallel_map(add, parts, store.files.at_once)))
+
+
+def _copied(a: StoredMap, store: MapStore, keep: tuple[str, ...]) -> dict[int, Tile]:
+    """Write the tiles of a map to another store, a few at a time."""
+    tiles: dict[int, Tile] = {}
+    parts, at_once = a.parts(), store.files.at_once
+    while some := dict(islice(parts, at_once)):
+        tiles |= dict(zip(some, parallel_map(lambda key: store.put(key, _only(some[key], keep)), some, at_once)))
+    return tiles
 
 
 def _only(arrays: Arrays, prefixes: tuple[str, ...]) -> Arrays:

@@ -7,43 +7,72 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from semgp.blocks.arrays import F64, I64
-from semgp.maps.tiles import Tiling
 from semgp.prediction import OccupancyPrediction, Prediction
-from semgp.voxels import voxel_keys
+from semgp.store.settings import Settings
+from semgp.voxels import voxel_indices, voxel_keys
 
 
 def groups(
-    points: F64, tiling: Tiling, resolution: float, origin: I64, half: float, sizes: Mapping[int, int], most: int
+    points: F64,
+    settings: Settings,
+    origin: I64,
+    sizes: Mapping[int, int],
+    most_sites: int,
+    most_points: int | None = None,
 ) -> Iterator[tuple[I64, I64]]:
     """Yield rows of points, each row once, and the keys of the tiles that their answers depend on.
+
+    All rows in their order where that is little enough. Else the box of their tiles is halved across its longest
+    edge, again and again: what is left is compact, and neighbours follow each other.
 
     Parameters
     ----------
     points : (M, 3) array
         Metres, world frame.
-    tiling, resolution, origin, half
-        See `Tiling.round_points`.
+    settings : Settings
+        Of the map.
+    origin : (3,) array
+        Voxel where its keys begin.
     sizes : mapping of int to int
         Sites of each tile that there is.
-    most : int
+    most_sites : int
         The sites of a group's tiles, unless those of a single tile's points are more.
+    most_points : int, optional
+        The points of a group; any number by default.
     """
-    needed = tiling.round_points(points, resolution, origin, half)
-    if sum(sizes.get(tile, 0) for tile in needed.tolist()) <= most:
-        yield np.arange(len(points)), needed
+
+    def near(rows: I64) -> I64:
+        return settings.tiling.round_points(points[rows], settings.resolution, origin, settings.half_blend)
+
+    def fit(rows: I64, tiles: I64) -> bool:
+        few = most_points is None or len(rows) <= most_points
+        return few and sum(sizes.get(tile, 0) for tile in tiles.tolist()) <= most_sites
+
+    rows = np.arange(len(points))
+    if fit(rows, tiles := near(rows)):
+        yield rows, tiles
         return
-    home = tiling.keys(voxel_keys(points, resolution, origin, allow_outside=True))
+    home = settings.tiling.keys(voxel_keys(points, settings.resolution, origin, allow_outside=True))
     order = np.argsort(home, kind="stable")
-    rows: list[I64] = []
-    tiles: set[int] = set()
-    for mine in np.split(order, np.flatnonzero(np.diff(home[order])) + 1):
-        more = set(tiling.round_points(points[mine], resolution, origin, half).tolist())
-        if rows and sum(sizes.get(tile, 0) for tile in tiles | more) > most:
-            yield np.concatenate(rows), np.array(sorted(tiles), dtype=np.int64)
-            rows, tiles = [], set()
-        rows.append(mine)
-        tiles |= more
-    yield np.concatenate(rows), np.array(sorted(tiles), dtype=np.int64)
+    homes, first = np.unique(home[order], return_index=True)
+    rows_of = np.split(order, first[1:])
+    near_to = [near(rows) for rows in rows_of]
+    place = voxel_indices(homes, origin)
+    left = [np.arange(len(homes))]
+    while left:
+        box = left.pop()
+        rows = np.concatenate([rows_of[i] for i in box])
+        tiles = np.unique(np.concatenate([near_to[i] for i in box]))
+        if fit(rows, tiles):
+            yield rows, tiles
+        elif len(box) > 1:
+            along = place[box, np.argmax(np.ptp(place[box], axis=0))]
+            steps = np.unique(along)
+            high = along >= steps[len(steps) // 2]
+            left += [box[high], box[~high]]
+        else:
+            n = -(-len(rows) // (most_points or len(rows)))
+            yield from ((some, tiles) for some in np.array_split(rows, n))
 
 
 def in_order(parts: Sequence[Prediction], rows: Sequence[I64]) -> Prediction:

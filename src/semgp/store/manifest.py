@@ -42,6 +42,11 @@ class Tile(NamedTuple):
     sites: int
     free_sites: int
 
+    @property
+    def all_sites(self) -> int:
+        """Sites of labels and of free space: what the tile takes in memory."""
+        return self.sites + self.free_sites
+
     def name(self, key: int) -> str:
         """Return the name of the file of the tile with a key."""
         return f"{key:016x}-{self.digest[:32]}.npz"
@@ -178,18 +183,16 @@ def _refuse(constant: str) -> float:
 
 
 def _tiles(rows: Any, tiling: Tiling) -> dict[int, Tile]:
+    keys = np.array([_whole(key, 0) for key, *_ in rows], dtype=np.int64)
+    if (tiling.keys(keys) != keys).any() or len(np.unique(keys)) < len(keys):
+        raise InputError("is damaged: a key that is no tile's, or occurs twice.")
     tiles: dict[int, Tile] = {}
+    most = 1 << 3 * tiling.bits
     for key, digest, *counts in rows:
-        if (
-            not 0 <= _whole(key, 0) < 1 << 63
-            or int(tiling.keys(np.array([key], dtype=np.int64))[0]) != key
-            or key in tiles
-        ):
-            raise InputError(f"is damaged: {key} is no key of a tile, or occurs twice.")
         if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
             raise InputError(f"is damaged: {digest!r} is no checksum.")
         n_bytes, sites, free_sites = (_whole(count, 0) for count in counts)
-        if max(sites, free_sites) > 1 << 3 * tiling.bits:
+        if max(sites, free_sites) > most:
             raise InputError(f"is damaged: a tile cannot have {max(sites, free_sites)} sites.")
         tiles[key] = Tile(digest, n_bytes, sites, free_sites)
     return tiles

@@ -14,7 +14,6 @@ from semgp.errors import InputError
 from semgp.maps.protocol import require_classes
 from semgp.store.commit import commit
 from semgp.store.contents import describe
-from semgp.store.manifest import Manifest
 from semgp.store.settings import Settings
 from semgp.store.store import MapStore
 from semgp.store.tiled_map import TiledMap
@@ -60,8 +59,7 @@ class StoredMap(TiledMap):
         if most_sites < 1:
             raise InputError(f"most_sites must be at least 1, not {most_sites}.")
         self.store = store if isinstance(store, MapStore) else MapStore(store)
-        self._base = self.store.manifest(version)
-        super().__init__(WorkingSet(self.store, self._base, most_sites))
+        super().__init__(WorkingSet(self.store, self.store.manifest(version), most_sites))
         self._clouds = 0
         self._writing, self._is_writing = ExitStack(), False
 
@@ -83,7 +81,7 @@ class StoredMap(TiledMap):
     @property
     def version(self) -> int:
         """The version that the map was opened at, or that it published last."""
-        return self._base.number
+        return self._working.base.number
 
     def update(self, cloud: LabelledCloud) -> None:
         """Add the labelled points of a cloud and, where free space is kept, what its rays tell.
@@ -91,20 +89,37 @@ class StoredMap(TiledMap):
         Raises
         ------
         InputError
-            As `GPSemanticMap.update`; FileFormatError for tiles that are damaged. The map is then as before.
+            As `GPSemanticMap.update`; FileFormatError for tiles that are damaged, ConflictError where the version
+            that the map is open at has been removed. The map is then as before.
         """
         require_classes(cloud, self.classes)
+        self._begin_writing()
+        try:
+            self._add(cloud)
+        except Exception:
+            if not self._clouds:
+                self.close()  # no writer yet: others need not wait
+            raise
+
+    def _add(self, cloud: LabelledCloud) -> None:
         if not len(cloud):
             self._clouds += 1
             return
-        if not self._is_writing:
-            self._writing.enter_context(self.store.writing())
-            self._is_writing = True
         self._working.hold(self._touched(cloud))
         self._working.state.add(cloud)
         self._working.mark()
         self._clouds += 1
         self._working.make_room()
+
+    def _begin_writing(self) -> None:
+        """Count as a writer: from now on, until `close`, nobody removes a version."""
+        if self._is_writing:
+            return
+        with ExitStack() as begun:
+            begun.enter_context(self.store.writing())
+            self.store.require_still(self.version)
+            self._writing = begun.pop_all()
+        self._is_writing = True
 
     def _touched(self, cloud: LabelledCloud) -> I64:
         """The tiles that a cloud may change; rays stay within the box round their ends."""
@@ -133,7 +148,7 @@ class StoredMap(TiledMap):
             Both cannot be added up, see `semgp.store.commit.commit`. The updates are still there.
         """
         if self._clouds or self._working.is_changed:
-            self._base = commit(self._working, self._base, self._clouds, note, merge)
+            commit(self._working, self._clouds, note, merge)
             self._clouds = 0
         self.close()
         return self.version
@@ -148,13 +163,8 @@ class StoredMap(TiledMap):
         """
         if self._clouds:
             raise InputError("the map has updates that are not committed: commit them first.")
-        self._go_on_from(self.store.manifest())
+        self._working.move_to(self.store.manifest())
         return self.version
-
-    def _go_on_from(self, manifest: Manifest) -> None:
-        origin = None if manifest.origin is None else np.array(manifest.origin, dtype=np.int64)
-        self._working.move_to(manifest.tiles, origin, manifest.clock)
-        self._base, self._clouds = manifest, 0
 
     def close(self) -> None:
         """Let go of the writers' lock, and forget updates that are not committed.
@@ -162,7 +172,8 @@ class StoredMap(TiledMap):
         Some of them may be in files of no version, which the next writer removes.
         """
         if self._clouds or self._working.is_changed:
-            self._go_on_from(self._base)
+            self._working.move_to(self._working.base)
+            self._clouds = 0
         self._writing.close()
         self._is_writing = False
 
@@ -180,8 +191,8 @@ class StoredMap(TiledMap):
     @property
     def clouds(self) -> int:
         """How many clouds the map has taken in."""
-        return self._base.clouds + self._clouds
+        return self._working.base.clouds + self._clouds
 
     def info(self) -> dict[str, Any]:
         """Return version, model, counts and memory, ready for JSON; tiles are not read."""
-        return describe(self.store, self._base) | self._working.info()
+        return describe(self.store, self._working.base) | self._working.info()

@@ -42,7 +42,8 @@ def save(semantic_map: GPSemanticMap, store: MapStore | str | Path, *, cells: in
         store.require_empty()
         keys = every_tile(state, settings.tiling)
         parts = cut(state, settings.tiling, keys)
-        tiles = dict(zip(parts, parallel_map(lambda tile: store.put(tile, parts[tile]), parts)))
+        put = parallel_map(lambda tile: store.put(tile, parts[tile]), parts, store.files.at_once)
+        tiles = dict(zip(parts, put))
         return store.publish(
             Manifest(0, settings, "", origin=voxel(state.origin), clock=state.clock, tiles=tiles), note
         )

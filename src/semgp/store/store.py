@@ -1,36 +1,28 @@
-"""The store: a map's versions on disk or in a bucket, as tile files and the manifests that list them."""
+"""The store: versions and tiles of one map in a folder or bucket, and what keeps house there."""
 
 from __future__ import annotations
 
-import hashlib
-import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-
-from semgp.errors import ConflictError, FileFormatError, InputError
-from semgp.maps.tiles import Arrays, tile_sites
+from semgp.errors import FileFormatError, InputError
 from semgp.parallel import parallel_map
 from semgp.store.bucket import open_files
 from semgp.store.files import Files
 from semgp.store.manifest import Manifest, Tile
 from semgp.store.settings import Settings
-from semgp.store.tile_files import decode, encode
-
-_MANIFEST = re.compile(r"([0-9]{8,18})\.json")
-_TILE = re.compile(r"[0-9a-f]{16}-[0-9a-f]{32}\.npz")
+from semgp.store.tiles import Tiles
+from semgp.store.versions import Versions, manifest_name
 
 
-class MapStore:
+class MapStore(Versions, Tiles):
     """A folder or bucket with the versions of one map.
 
-    `tiles/` holds immutable files of sites, `manifests/` one file a version, numbered from 1. Both are created
-    whole or not at all, and never overwritten; a version is there when its manifest is. Whoever creates the next
-    number first has won.
+    `tiles/` holds immutable files of sites, `manifests/` one file a version, see `Tiles` and `Versions`. Readers
+    need no lock. Writers of a folder share one, so that files are removed only where nobody can be about to list
+    them; in a bucket, and on systems without such locks, writers cannot be seen.
 
     Parameters
     ----------
@@ -46,12 +38,7 @@ class MapStore:
     """
 
     def __init__(self, location: str | Path, files: Files | None = None) -> None:
-        self.files = open_files(location) if files is None else files
-
-    @property
-    def location(self) -> str:
-        """The folder's path or the bucket's URL."""
-        return self.files.location
+        super().__init__(open_files(location) if files is None else files)
 
     def create(self, settings: Settings, note: str = "") -> Manifest:
         """Begin a map: publish version 1, without tiles.
@@ -69,155 +56,6 @@ class MapStore:
         if self.numbers():
             raise InputError(f"{self.location} holds a map already: update it, or choose another place.")
 
-    def numbers(self) -> list[int]:
-        """Return the numbers of the versions, ascending."""
-        found = (_MANIFEST.fullmatch(name) for name in self.files.names("manifests"))
-        return sorted(int(match[1]) for match in found if match)
-
-    def manifest(self, number: int | None = None) -> Manifest:
-        """Return a version's manifest, the newest by default.
-
-        Raises
-        ------
-        InputError
-            No map at the location, or no such version; FileFormatError for a damaged manifest.
-        """
-        numbers = self.numbers()
-        if not numbers:
-            raise InputError(f"{self.location} holds no map: `semgp build` makes one.")
-        wanted = numbers[-1] if number is None else number
-        if wanted not in numbers:
-            raise InputError(f"{self.location} has no version {wanted}, but {_listed(numbers)}.")
-        name = _manifest_name(wanted)
-        try:
-            manifest = Manifest.from_bytes(self.files.read(name))
-            if manifest.number != wanted:
-                raise InputError(f"is damaged: it says that it is version {manifest.number}.")
-        except FileFormatError:
-            raise
-        except InputError as error:
-            hint = "" if len(numbers) < 2 else " Other versions may be whole: `semgp store versions`."
-            raise FileFormatError(f"{self.location}/{name}", f"{error}{hint}") from error
-        return manifest
-
-    def publish(self, manifest: Manifest, note: str = "") -> Manifest:
-        """Create the version that follows a manifest's number, of its tiles, and return its manifest.
-
-        Raises
-        ------
-        ConflictError
-            That version is there: another writer was faster.
-        """
-        time = datetime.now(UTC).isoformat(timespec="milliseconds")
-        following = replace(manifest, number=manifest.number + 1, time=time, note=note)
-        if not self.files.create(_manifest_name(following.number), following.to_bytes()):
-            raise ConflictError(
-                f"{self.location}: another writer has made version {following.number} since version "
-                f"{manifest.number} was read. Merge with it, or open the map anew and try again."
-            )
-        return following
-
-    def put(self, key: int, arrays: Arrays) -> Tile:
-        """Create the file of a tile; nobody sees it before a manifest lists it."""
-        data = encode(arrays)
-        sites, free_sites = (len(arrays.get(name, ())) for name in ("voxels", "free.voxels"))
-        tile = Tile(hashlib.sha256(data).hexdigest(), len(data), sites, free_sites)
-        name = f"tiles/{tile.name(key)}"
-        if not self.files.create(name, data) and self.files.read(name) != data:  # it is damaged
-            self.files.remove(name)
-            self.files.create(name, data)
-        return tile
-
-    def get(self, key: int, tile: Tile, settings: Settings) -> Arrays:
-        """Return the arrays of a tile.
-
-        Raises
-        ------
-        FileFormatError
-            A file that is missing or damaged.
-        """
-        name = f"tiles/{tile.name(key)}"
-        data = self.files.read(name, tile.n_bytes)
-        try:
-            if hashlib.sha256(data).hexdigest() != tile.digest:
-                raise InputError("is damaged: its checksum is not the one in the manifest.")
-            columns = {"": len(settings.classes) + settings.model.other}
-            columns |= {} if settings.free is None else {"free.": 2}
-            arrays = decode(data, columns)
-            for prefix, n in columns.items():
-                dims = 3 if prefix else settings.model.n_dims
-                tile_sites(arrays, prefix, settings.tiling, key, np.zeros(3, np.int64), n, dims)
-            counts = tuple(len(arrays.get(name, ())) for name in ("voxels", "free.voxels"))
-            if counts != (tile.sites, tile.free_sites):
-                raise InputError(f"is damaged: it has {counts} sites, not {(tile.sites, tile.free_sites)}.")
-        except InputError as error:
-            raise FileFormatError(f"{self.location}/{name}", str(error)) from error
-        return arrays
-
-    def roll_back(self, number: int, note: str = "") -> Manifest:
-        """Publish an older version again, as the newest; the ones in between stay.
-
-        Raises
-        ------
-        InputError
-            No such version; ConflictError if another writer was faster.
-        """
-        old, newest = self.manifest(number), self.numbers()[-1]
-        return self.publish(replace(old, number=newest), note or f"version {number} again")
-
-    def prune(self, keep: int) -> int:
-        """Remove all but the newest versions, and tile files that none of those lists; return how many of these.
-
-        Maps that are open at an older version lose what they have not loaded yet.
-
-        Raises
-        ------
-        InputError
-            Fewer than one version to keep, or another writer at work.
-        """
-        if keep < 1:
-            raise InputError(f"at least one version must be kept, not {keep}.")
-        lock = self.files.lock()
-        try:
-            if lock.alone is False:
-                raise InputError(f"{self.location}: another writer is at work: try again when it has ended.")
-            for number in self.numbers()[:-keep]:
-                self.files.remove(_manifest_name(number))
-            return self.clean()
-        finally:
-            lock.release()
-
-    def clean(self, older: float = 0.0) -> int:
-        """Remove tile files that no version lists and that are so many seconds old; return how many.
-
-        For a writer that is alone: others may be about to list them. Writers of a folder do it by themselves.
-        """
-        listed = {t.name(key) for n in self.numbers() for key, t in self.manifest(n).tiles.items()}
-        tiles = filter(_TILE.fullmatch, self.files.names("tiles"))  # and nothing that others have put there
-        orphans = [f"tiles/{name}" for name in tiles if name not in listed]
-        gone = [name for name in orphans if older == 0 or self.files.age(name) >= older]
-        for name in gone:
-            self.files.remove(name)
-        return self.files.remove_partial() + len(gone)
-
-    def tidy(self) -> None:
-        """Remove what no version lists, where there is no other writer and that can be told."""
-        with self.writing():
-            pass
-
-    def check(self, number: int | None = None) -> Iterator[FileFormatError]:
-        """Read every tile of a version, and yield what is wrong with those that are damaged."""
-        manifest = self.manifest(number)
-
-        def look(item: tuple[int, Tile]) -> FileFormatError | None:
-            try:
-                self.get(*item, manifest.settings)
-            except FileFormatError as error:
-                return error
-            return None
-
-        yield from filter(None, parallel_map(look, manifest.tiles.items()))
-
     @contextmanager
     def writing(self) -> Iterator[None]:
         """Count as a writer for the length of a block.
@@ -234,10 +72,87 @@ class MapStore:
         finally:
             lock.release()
 
+    def tidy(self) -> None:
+        """Remove what no version lists, where there is no other writer and that can be told."""
+        with self.writing():
+            pass
 
-def _manifest_name(number: int) -> str:
-    return f"manifests/{number:08d}.json"
+    @property
+    def sees_writers(self) -> bool:
+        """Whether other writers can be told to be at work: in folders, but for systems without locks of files."""
+        lock = self.files.lock()
+        lock.release()
+        return lock.alone is not None
 
+    def roll_back(self, number: int, note: str = "") -> Manifest:
+        """Publish an older version again, as the newest; the ones in between stay.
 
-def _listed(numbers: list[int]) -> str:
-    return f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
+        Raises
+        ------
+        InputError
+            No such version; ConflictError where another writer was faster.
+        """
+        old = self.manifest(number)
+        with self.writing():
+            self.require_still(number)
+            return self.publish(replace(old, number=self.numbers()[-1]), note or f"version {number} again")
+
+    def drop(self, numbers: Collection[int]) -> int | None:
+        """Remove versions, the newest never, and tile files that no other one lists; return how many of these.
+
+        While another writer is at work, which may be about to list these files, nothing is removed and None is
+        returned. Where writers cannot be seen, the caller must know that there is none.
+
+        Manifests go before tiles: whoever is killed meanwhile leaves whole versions, and files that the next
+        writer removes. Maps that are open at a version that is gone raise ConflictError once they need more of it.
+        """
+        lock = self.files.lock()
+        try:
+            if lock.alone is False:
+                return None
+            old = [manifest_name(number) for number in self.numbers()[:-1] if number in numbers]
+            parallel_map(self.files.remove, old, self.files.at_once)
+            return self.clean()
+        finally:
+            lock.release()
+
+    def prune(self, keep: int) -> int:
+        """Drop all but the newest versions, see `drop`, and return how many tile files that were.
+
+        Raises
+        ------
+        InputError
+            Fewer than one version to keep, or another writer at work.
+        """
+        if keep < 1:
+            raise InputError(f"at least one version must be kept, not {keep}.")
+        removed = self.drop(self.numbers()[:-keep])
+        if removed is None:
+            raise InputError(f"{self.location}: another writer is at work: try again when it has ended.")
+        return removed
+
+    def clean(self, older: float = 0.0) -> int:
+        """Remove tile files that no version lists and that are so many seconds old; return how many.
+
+        For a writer that is alone: others may be about to list them. Writers of a folder do it by themselves.
+        """
+        at_once = self.files.at_once
+        manifests = parallel_map(self.manifest, self.numbers(), at_once)
+        orphans = self.orphans({tile.name(key) for manifest in manifests for key, tile in manifest.tiles.items()})
+        ages = parallel_map(self.files.age, orphans, at_once) if older else [0.0] * len(orphans)
+        gone = [name for name, age in zip(orphans, ages) if age >= older]
+        parallel_map(self.files.remove, gone, at_once)
+        return self.files.remove_partial() + len(gone)
+
+    def check(self, number: int | None = None) -> Iterator[FileFormatError]:
+        """Read every tile of a version, and yield what is wrong with those that are damaged."""
+        manifest = self.manifest(number)
+
+        def look(item: tuple[int, Tile]) -> FileFormatError | None:
+            try:
+                self.get(*item, manifest.settings)
+            except FileFormatError as error:
+                return error
+            return None
+
+        yield from filter(None, parallel_map(look, manifest.tiles.items(), self.files.at_once))

@@ -108,10 +108,7 @@ class TiledMap:
         require_data(working.n_sites)
         assert working.state.origin is not None
         parts, all_rows = [], []
-        for rows, tiles in groups(
-            X, self.settings.tiling, self.resolution, working.state.origin, self.settings.half_blend,
-            working.sizes, working.most_sites,
-        ):  # fmt: skip
+        for rows, tiles in groups(X, self.settings, working.state.origin, working.sizes, working.most_sites):
             working.hold(tiles)
             parts.append(answer(rows))
             all_rows.append(rows)

@@ -9,7 +9,7 @@ import numpy as np
 from semgp.blocks.arrays import F64, I64
 from semgp.errors import FileFormatError, InputError
 from semgp.maps.tiles import Arrays, changed_tiles, cut, drop, take_in
-from semgp.parallel import parallel_map
+from semgp.parallel import parallel_map, slices
 from semgp.store.manifest import Manifest, Tile
 from semgp.store.store import MapStore
 
@@ -30,6 +30,10 @@ class WorkingSet:
     ----------
     state : ManyBlocks
         The map of the tiles in memory.
+    base : Manifest
+        The version that the map has gone on from.
+    unanswered : Manifest or None
+        The next version, where the store failed before it told whether that is there.
     tiles : dict of int to Tile
         The files of all tiles of the map, those that no manifest lists yet included.
     sizes : dict of int to int
@@ -37,10 +41,11 @@ class WorkingSet:
     """
 
     def __init__(self, store: MapStore, manifest: Manifest, most_sites: int) -> None:
-        self.store, self.settings = store, manifest.settings
+        self.store, self.settings, self.base = store, manifest.settings, manifest
         self.state = manifest.settings.new_state()
         self.tiles, self.sizes = dict(manifest.tiles), _sizes(manifest.tiles)
         self.most_sites = most_sites
+        self.unanswered: Manifest | None = None
         self._held: dict[int, None] = {}  # the one used last comes last
         self._changed: set[int] = set()
         if manifest.origin is not None:
@@ -53,6 +58,7 @@ class WorkingSet:
         ------
         FileFormatError
             A tile whose file is damaged or missing; none of those that were not in memory are then.
+            ConflictError where it is missing because its version has been removed.
         """
         needed = [tile for tile in wanted.tolist() if tile in self.tiles or tile in self._held]
         missing = [tile for tile in needed if tile not in self._held]
@@ -78,7 +84,13 @@ class WorkingSet:
     def read(self, tiles: Iterable[int]) -> dict[int, Arrays]:
         """Return the arrays in tiles' files."""
         tiles = list(tiles)
-        return dict(zip(tiles, parallel_map(lambda t: self.store.get(t, self.tiles[t], self.settings), tiles)))
+        try:
+            at_once = self.store.files.at_once
+            read = parallel_map(lambda t: self.store.get(t, self.tiles[t], self.settings), tiles, at_once)
+        except FileFormatError:
+            self.store.require_still(self.base.number)
+            raise
+        return dict(zip(tiles, read))
 
     def make_room(self, coming: int = 0, needed: Collection[int] = ()) -> None:
         """Drop tiles that are not needed, those not used for longest first, until so many more sites fit."""
@@ -115,9 +127,9 @@ class WorkingSet:
         """Write changed tiles, all of them by default, to files that no manifest lists yet."""
         chosen = sorted(self._changed if tiles is None else tiles)
         arrays = cut(self.state, self.settings.tiling, np.array(chosen, dtype=np.int64))
-        written = parallel_map(lambda tile: self.store.put(tile, arrays[tile]), chosen)
+        written = parallel_map(lambda t: self.store.put(t, arrays[t]), chosen, self.store.files.at_once)
         for tile, file in zip(chosen, written):
-            self.tiles[tile], self.sizes[tile] = file, file.sites + file.free_sites
+            self.tiles[tile], self.sizes[tile] = file, file.all_sites
         self._changed.difference_update(chosen)
 
     def parts(self, low: F64 | None = None, high: F64 | None = None) -> Iterator[tuple[int, Arrays]]:
@@ -126,11 +138,13 @@ class WorkingSet:
         if low is not None and high is not None and self.state.origin is not None:
             settings = self.settings
             tiles = tiles[settings.tiling.overlap(tiles, self.state.origin, low, high, settings.resolution)]
-        for tile in tiles.tolist():
-            if tile in self._held:
-                yield tile, cut(self.state, self.settings.tiling, np.array([tile]))[tile]
-            else:
-                yield tile, self.read([tile])[tile]
+        for some in slices(len(tiles), self.store.files.at_once):
+            ahead = self.read(tile for tile in tiles[some].tolist() if tile not in self._held)
+            for tile in tiles[some].tolist():
+                if tile in self._held:
+                    yield tile, cut(self.state, self.settings.tiling, np.array([tile]))[tile]
+                else:
+                    yield tile, ahead.pop(tile) if tile in ahead else self.read([tile])[tile]
 
     @property
     def n_sites(self) -> int:
@@ -145,11 +159,12 @@ class WorkingSet:
             "bytes_in_memory": sum(f.sites.n_bytes + f.store.n_bytes for f in self.state.fields.values()),
         }
 
-    def move_to(self, tiles: Mapping[int, Tile], origin: I64 | None, clock: float | None) -> None:
-        """Go on with other files: tiles in memory that differ are dropped, and blocks beside them solved anew.
+    def move_to(self, manifest: Manifest) -> None:
+        """Go on from another version: tiles that differ leave memory, and blocks beside them are solved anew.
 
         Changes that were not written are lost.
         """
+        tiles, clock = manifest.tiles, manifest.clock
         differ = [t for t in tiles.keys() | self.tiles.keys() if tiles.get(t) != self.tiles.get(t)]
         differ += self._changed.difference(differ)
         gone = np.array(differ, dtype=np.int64)
@@ -159,14 +174,15 @@ class WorkingSet:
             field.store.stale[beside] = True
         self._drop(differ)
         self._changed.clear()
-        self.tiles, self.sizes = dict(tiles), _sizes(tiles)
+        self.base, self.tiles, self.sizes = manifest, dict(tiles), _sizes(tiles)
+        self.unanswered = None
         before = self.state.clock
-        if origin is None or (before is not None and (clock is None or clock < before)):  # back in time
+        if manifest.origin is None or (before is not None and (clock is None or clock < before)):  # back in time
             self.state = self.settings.new_state()
             self._held.clear()
-        if origin is not None:
-            self.state.begin(origin, clock)
+        if manifest.origin is not None:
+            self.state.begin(np.array(manifest.origin, dtype=np.int64), clock)
 
 
 def _sizes(tiles: Mapping[int, Tile]) -> dict[int, int]:
-    return {key: tile.sites + tile.free_sites for key, tile in tiles.items()}
+    return {key: tile.all_sites for key, tile in tiles.items()}

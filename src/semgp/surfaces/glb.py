@@ -57,7 +57,7 @@ def write_glb(path: str | Path, mesh: Mesh) -> None:
         mesh.vertices - middle,
         mesh.faces,
         vertex_normals=mesh.normals,
-        vertex_colors=_linear(mesh.colours),
+        vertex_colors=linear(mesh.colours),
         vertex_attributes={name: values.astype(np.float32) for name, values in attributes.items()},
         process=False,
     )
@@ -79,7 +79,7 @@ def _finish(tree: dict[str, Any]) -> None:
             primitive["material"] = 0
 
 
-def _linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return sRGB colours as linear light (IEC 61966-2-1)."""
     c = colours / 255
     light = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

@@ -6,26 +6,27 @@ import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from semgp.errors import InputError, SemgpError
+from semgp.errors import SemgpError
 from semgp.maps.protocol import SemanticMap
-from semgp.maps.settings import require_positive
-from semgp.picture.view import view_of
 from semgp.surfaces.mesh import Mesh
 from semgp.upward import Up, direction
 from semgp.viewer import cards
-from semgp.viewer.controls import Controls, PlayControls, dress
-from semgp.viewer.fields import CLASS, field_called, field_names
+from semgp.viewer.controls import Controls
+from semgp.viewer.fields import CLASS, field_names
 from semgp.viewer.layers import Layer
 from semgp.viewer.playback import Playback
-from semgp.viewer.scene import MAP, Scene, start_server, stop_server
-from semgp.viewer.state import Progress, Sample, Shown, ViewState, pick, show, take_sample
-from semgp.viewer.surface import Surface
+from semgp.viewer.player import Player
+from semgp.viewer.scene import MAP, MESH, Scene
+from semgp.viewer.server import start_server, stop_server
+from semgp.viewer.sight import pick
+from semgp.viewer.source import Source, Tell, asks
+from semgp.viewer.state import Shown, ViewState, show
+from semgp.viewer.widgets import furnish
 from semgp.viewer.worker import Latest, SupersededError
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class LiveViewer:
     host, port : str, int
         Where to listen; by default only this machine can connect. Port 0 is any that is free.
     resolution : float, optional
-        How far apart the points are at first, metres; left out, the spacing of the map's data.
+        How far apart the points are at first, metres; left out, half the spacing of the data if they fit.
     field : str
         What the points are coloured by at first, see `semgp.viewer.fields`.
     hide : iterable of str
@@ -86,34 +87,25 @@ class LiveViewer:
         layers: Sequence[Layer] = (),
         mesh: Mesh | None = None,
     ) -> None:
-        if most < 1:
-            raise InputError(f"a viewer shows at least one point, not {most}.")
-        self._playback = source if isinstance(source, Playback) else None
-        self._map = source.begin() if isinstance(source, Playback) else source
-        self._surface, upward = Surface(self._map.positions), direction(up or self._map.up)
-        probe = self._map.query(self._surface.positions[:1])
-        spacing, breadth = self._surface.spacing, float(np.linalg.norm(self._surface.high - self._surface.low))
-        self.state = ViewState(
-            resolution=spacing if resolution is None else require_positive("resolution", resolution),
-            field=field_called(probe, field),
-            hidden=frozenset(self._map.classes.index(name) for name in hide),
-            scans=0 if self._playback is None else self._playback.done,
-        )
-        self._most, self._lock, self._changed = most, threading.Lock(), threading.Condition()
+        self._source = Source(source, most)
+        surface, classes = self._source.surface, self._source.semantic_map.classes
+        upward = direction(up or self._source.semantic_map.up)
+        beside = [*(layer.name for layer in layers), *([] if mesh is None else [MESH])]
+        self.state = self._source.first_state(resolution, field, hide, beside)
+        self._lock, self._changed = threading.Lock(), threading.Condition()
         self._shown: Shown | None = None
         self._drawn: ViewState | None = None
         self._server = start_server(host, port)
-        dress(self._server.gui, dark=False)
-        self._server.gui.set_panel_label(title)
+        furnish(self._server.gui, title)
         self._worker = Latest(self._work, self._failed)
-        self._scene = Scene(self._server, np.round(self._surface.positions.mean(axis=0)), upward, layers, mesh)
-        self._scene.look(view_of(self._surface.positions, up=upward), breadth)
+        middle = np.round(surface.positions.mean(axis=0))
+        self._scene = Scene(self._server, middle, upward, layers, mesh, self._failed)
+        self._scene.look_at(surface)
         self._server.scene.on_click()(self._click)
-        beside = [name for name in self._scene.names if name != MAP]
-        self.state = replace(self.state, off=frozenset(beside))
-        self._controls = Controls(self._server, self, self._map.classes, field_names(probe), spacing)
-        self._play = None if self._playback is None else PlayControls(self._server, self, len(self._playback))
-        self._controls.reach(self._surface.low, self._surface.high)
+        playback = self._source.playback
+        self._player = None if playback is None else Player(self._server, self, len(playback))
+        self._controls = Controls(self._server, self, classes, field_names(self._source.probe), surface.spacing)
+        self._controls.reach(surface.low, surface.high)
         for name in self._scene.names if beside else []:
             self._controls.add_layer(self._server.gui, name, partial(self.switch_layer, name), name == MAP)
         self._worker.request(self.state)
@@ -150,10 +142,10 @@ class LiveViewer:
         with self._changed:
             return self._changed.wait_for(lambda: self._drawn is self.state, timeout)
 
-    def read(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
+    def read(self, origin: ArrayLike, ahead: ArrayLike) -> int | None:
         """Show what the map says where a ray meets it, world frame; return the row of the sample, or None."""
         shown = self._shown
-        row = None if shown is None else pick(shown, origin, direction)
+        row = None if shown is None else pick(shown, origin, ahead, see_inside=self.state.see_inside)
         if shown is None or row is None:
             return None
         self._controls.answer(cards.answer(shown.sample, row))
@@ -163,14 +155,13 @@ class LiveViewer:
     def close(self) -> None:
         """Stop the server and the work."""
         self._worker.close()
+        self._scene.close()
         stop_server(self._server)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _click(self, event: viser.SceneClickEvent) -> None:
@@ -181,48 +172,28 @@ class LiveViewer:
 
     def _work(self, state: ViewState) -> None:
         """Bring the picture to a state: add scans and ask the map if need be, then colour, cut and draw."""
-        if self._playback is not None and self._playback.done != state.scans:
-            self._grow(self._playback, state)
-        before = self._drawn
-        if before is None or self._shown is None or _asks(before) != _asks(state):
-            sample = take_sample(self._map, self._surface, state.resolution, self._most, self._report(state))
-        else:
-            sample = self._shown.sample
+        before = self._source.surface
+        sample = self._source.sample(state, self._report(state))
+        if self._player is not None and (surface := self._source.surface) is not before:
+            self._controls.reach(surface.low, surface.high)
+            self._scene.look_at(surface)
+            self._player.tell(state.scans)
         self._shown = show(sample, state)
         self._scene.draw(self._shown, state)
         self._controls.show(self._shown, state.field)
-        self._controls.tell(_told(sample, len(self._shown.rows), state))
+        self._controls.tell(cards.told(sample, len(self._shown.rows), state.resolution))
         with self._changed:
             self._drawn = state
             self._changed.notify_all()
-        if self._play is not None:
-            self._play.go_on(state.scans)
+        if self._player is not None:
+            self._player.go_on(state.scans)
 
-    def _grow(self, playback: Playback, state: ViewState) -> None:
-        playback.go_to(state.scans, lambda n, total: self._controls.tell(f"adding scan {n + 1}", n / total))
-        self._map, self._surface = playback.semantic_map, Surface(playback.semantic_map.positions)
-        self._controls.reach(self._surface.low, self._surface.high)
-        assert self._play is not None
-        self._play.tell(playback.done)
+    def _report(self, state: ViewState) -> Tell:
+        """Return what tells progress, and gives up once another resolution or scan is wanted."""
 
-    def _report(self, state: ViewState) -> Progress:
-        """Return what reports progress, and gives up once another resolution or scan is wanted."""
-
-        def report(n: int, total: int) -> None:
-            if self._worker.closed or _asks(self.state) != _asks(state):
+        def report(text: str, share: float) -> None:
+            if self._worker.closed or asks(self.state) != asks(state):
                 raise SupersededError
-            self._controls.tell(f"asking the map: {n:,} of {total:,} points", n / max(total, 1))
+            self._controls.tell(text, share)
 
         return report
-
-
-def _asks(state: ViewState) -> tuple[float, int]:
-    """Return the choices for which the map is asked anew."""
-    return state.resolution, state.scans
-
-
-def _told(sample: Sample, seen: int, state: ViewState) -> str:
-    coarser = (
-        "" if sample.resolution == state.resolution else f", as there is no room for {state.resolution:.3g} m"
-    )
-    return f"{seen:,} of {len(sample.points):,} points, every {sample.resolution:.3g} m{coarser}"

@@ -15,7 +15,7 @@ from semgp.classes import MISSING
 from semgp.errors import InputError
 from semgp.prediction import Prediction
 from semgp.viewer.fields import field_scale, field_values
-from semgp.viewer.state import Sample
+from semgp.viewer.sample import Sample
 
 TOP = 5
 """The most probable classes of each point, which are embedded with their probabilities; the rest is one sum."""
@@ -29,7 +29,7 @@ def bytes_per_point(prediction: Prediction) -> int:
     label = _label_type(len(prediction.classes)).itemsize
     top = min(TOP, len(prediction.classes))
     values = 1 + (prediction.variance is not None) + (prediction.occupancy is not None)
-    return 6 + 3 + label + top * (label + 1) + values
+    return 6 + 3 + 1 + label + top * (label + 1) + values
 
 
 def packed(sample: Sample) -> dict[str, Any]:
@@ -49,6 +49,7 @@ def packed(sample: Sample) -> dict[str, Any]:
         "label": np.where(label == MISSING, C, label).astype(label_type),
         "top": top.astype(label_type),
         "normal": np.rint(127 * sample.normals).astype(np.int8),
+        "oneSided": sample.one_sided.astype(np.uint8),
         "p": np.rint(_BYTE * np.take_along_axis(prediction.probability, top, axis=1)).astype(np.uint8),
     }
     scales = {}

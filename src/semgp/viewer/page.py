@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import html
 import json
-from collections.abc import Iterable, Sequence
-from importlib.resources import files
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from semgp.classes import Classes
 from semgp.errors import InputError
-from semgp.maps.batches import query_in_batches
 from semgp.maps.protocol import SemanticMap
 from semgp.picture.colour import COLOUR_MAPS, GREY, by_value
 from semgp.picture.view import view_of
 from semgp.prediction import Prediction
 from semgp.upward import Up, direction
 from semgp.viewer.fields import CLASS, field_called, field_names, field_scale
+from semgp.viewer.levels import ask_all, levels
 from semgp.viewer.pack import bytes_per_point, packed
-from semgp.viewer.state import Progress, Sample
+from semgp.viewer.sample import Progress
 from semgp.viewer.surface import Surface
+from semgp.viewer.template import filled
 from semgp.writers import atomic_write
 
 MOST_BYTES = 8_000_000
 """A page is not larger than this, unless told."""
-
-LEVELS = 3
-"""Resolutions in a page, each half as fine as the one before."""
 
 _HEADER_BYTES = 100_000
 """Room in the budget for the program and the classes."""
@@ -83,7 +77,7 @@ def page(
     field = field_called(probe, field)
     hidden = [semantic_map.classes.index(name) for name in hide]
     room = (most_bytes - _HEADER_BYTES) * 3 // 4 // bytes_per_point(probe)
-    samples = _ask_all(semantic_map, surface, _levels(surface, resolution, room), progress)
+    samples = ask_all(semantic_map, surface, levels(surface, resolution, room), progress)
     view = view_of(samples[0].points, up=upward)
     finest = samples[0].prediction
     described = {
@@ -95,7 +89,7 @@ def page(
             name: by_value(np.linspace(0, 1, 256), 0, 1, name).ravel().tolist() for name in COLOUR_MAPS
         },
         "state": {"field": field, "hidden": hidden},
-        "oriented": surface.oriented,
+        "seeInside": any(bool(sample.one_sided.any()) for sample in samples),
         "up": upward.tolist(),
         "eye": view.T_world_camera[:3, 3].tolist(),
         "forward": view.T_world_camera[:3, 2].tolist(),
@@ -103,7 +97,7 @@ def page(
         "aspect": view.width / view.height,
         "levels": [packed(sample) for sample in samples],
     }
-    text = _filled(title, json.dumps(described, allow_nan=False))
+    text = filled(title, json.dumps(described, allow_nan=False))
     if len(text.encode()) > most_bytes:
         raise InputError(f"the page would take {len(text.encode()):,} bytes, more than allowed: too many classes.")
     return text
@@ -125,45 +119,6 @@ def write_page(semantic_map: SemanticMap, path: str | Path, **settings: object) 
     return len(text)
 
 
-def _levels(surface: Surface, resolution: float | None, room: int) -> list[tuple[np.ndarray, float]]:
-    """Return the points of each level, finest first, as many as there is room for."""
-    wanted = [surface.spacing / 2, surface.spacing] if resolution is None else [resolution]
-    if room < LEVELS:
-        raise InputError("a page with so few bytes has no room for points: allow more bytes.")
-    while True:
-        finest = wanted.pop(0)
-        levels = [surface.points(finest * 2**level, room) for level in range(LEVELS)]
-        total = sum(len(points) for points, _ in levels)
-        if total <= room and levels[0][1] == finest:
-            return levels
-        if resolution is not None:
-            raise InputError(
-                f"a page with points every {finest:g} m does not fit its size, which has room for "
-                f"{room:,} points: allow more bytes or a coarser resolution."
-            )
-        wanted = wanted or [max(levels[0][1], finest * 1.1)]
-
-
-def _ask_all(
-    semantic_map: SemanticMap,
-    surface: Surface,
-    levels: Sequence[tuple[np.ndarray, float]],
-    progress: Progress | None,
-) -> list[Sample]:
-    total, samples, before = sum(len(points) for points, _ in levels), [], 0
-    for points, resolution in levels:
-
-        def report(n: int, _: int, before: int = before) -> None:
-            if progress is not None:
-                progress(before + n, total)
-
-        samples.append(
-            Sample(points, surface.normals(points), query_in_batches(semantic_map, points, report), resolution)
-        )
-        before += len(points)
-    return samples
-
-
 def _described(classes: Classes) -> list[dict[str, str]]:
     return [{"name": n, "colour": _hex(c)} for n, c in zip(classes.names, classes.colours)]
 
@@ -177,24 +132,3 @@ def _scale(prediction: Prediction, name: str) -> dict[str, object] | None:
 
 def _hex(colour: tuple[int, int, int]) -> str:
     return "#" + bytes(colour).hex()
-
-
-def _filled(title: str, described: str) -> str:
-    """Return the page. What names contain can end neither its script nor its data: no `<` is left in them."""
-    folder = files("semgp.viewer")
-    style, program = ((folder / name).read_text(encoding="utf-8") for name in ("page.css", "page.js"))
-    digest = base64.b64encode(hashlib.sha256(program.encode()).digest()).decode()
-    parts = {
-        "title": html.escape(title),
-        "style": style,
-        "program": program,
-        "program-digest": digest,
-        "data": described.replace("<", "\\u003c"),
-    }
-    template = (folder / "page.html").read_text(encoding="utf-8")
-    pieces = template.split("{{")
-    filled = [pieces[0]]
-    for piece in pieces[1:]:
-        name, rest = piece.split("}}", 1)
-        filled += [parts[name], rest]
-    return "".join(filled)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgp.errors import InputError, MissingExtraError
-from semgp.picture.view import View
+from semgp.errors import SemgpError
+from semgp.picture.view import view_of
+from semgp.surfaces.glb import linear
 from semgp.surfaces.mesh import Mesh
+from semgp.viewer.eyes import Drawing, Eyes, add_points
 from semgp.viewer.layers import Layer, cut_mesh
-from semgp.viewer.state import Shown, ViewState, lit
+from semgp.viewer.sight import lit
+from semgp.viewer.state import Shown, ViewState
+from semgp.viewer.surface import Surface
 
 if TYPE_CHECKING:
     import viser
@@ -25,6 +26,9 @@ MAP, MESH = "map", "surface"
 
 _DISC = 1.25
 """Diameter of a point, in distances to the next: discs that turn to the eye then leave no gaps."""
+
+_BACK = 1.15
+"""Distance of the first view, in those at which the map fills the frame."""
 
 
 class Scene:
@@ -42,6 +46,8 @@ class Scene:
         What is shown beside the map.
     mesh : Mesh, optional
         The map's surface.
+    failed : callable
+        Takes errors of drawing for a camera that moves.
     """
 
     def __init__(
@@ -49,10 +55,12 @@ class Scene:
         server: viser.ViserServer,
         offset: NDArray[np.float64],
         up: NDArray[np.float64],
-        layers: Sequence[Layer] = (),
-        mesh: Mesh | None = None,
+        layers: Sequence[Layer],
+        mesh: Mesh | None,
+        failed: Callable[[SemgpError], None],
     ) -> None:
         self._server, self._offset, self._up, self._layers, self._mesh = server, offset, up, layers, mesh
+        self._eyes = Eyes(server, f"/{MAP}", offset, failed)
         server.scene.set_up_direction(up)
 
     @property
@@ -60,20 +68,21 @@ class Scene:
         """Names of all layers, the map's first."""
         return [MAP, *(layer.name for layer in self._layers), *([] if self._mesh is None else [MESH])]
 
-    def look(self, view: View, breadth: float) -> None:
-        """Let newcomers begin with a view of a world that is so many metres wide."""
+    def look_at(self, surface: Surface) -> None:
+        """Let newcomers, and whoever resets the view, see all of a surface."""
+        view = view_of(surface.positions, up=self._up)
         eye, ahead = view.T_world_camera[:3, 3] - self._offset, view.T_world_camera[:3, 2]
-        camera = self._server.initial_camera
-        camera.position = eye
-        camera.look_at = eye + max(float(-eye @ ahead), 0.1) * ahead
+        camera, distance = self._server.initial_camera, max(float(-eye @ ahead), 0.1)
+        camera.position = eye - (_BACK - 1) * distance * ahead
+        camera.look_at = eye + distance * ahead
         camera.fov = np.radians(view.fov)
-        camera.far = max(1000.0, 20 * breadth)
+        camera.far = max(1000.0, 20 * float(np.linalg.norm(surface.high - surface.low)))
 
     def draw(self, shown: Shown, state: ViewState) -> None:
         """Draw what is seen."""
         with self._server.atomic():
             size = _DISC * state.size * shown.sample.resolution
-            self._points(f"/{MAP}", shown.points, lit(shown, self._up), size, MAP not in state.off)
+            self._eyes.draw(Drawing(shown, lit(shown, self._up), size, MAP not in state.off, state.see_inside))
             for i, layer in enumerate(self._layers):
                 draw = self._cubes if layer.cubes else self._points
                 left = layer.within(state)
@@ -87,6 +96,10 @@ class Scene:
             "/mark", radius, (225, 0, 110), subdivisions=2, position=point - self._offset
         )
 
+    def close(self) -> None:
+        """Stop drawing."""
+        self._eyes.close()
+
     def in_world(self, point: ArrayLike) -> NDArray[np.float64]:
         """Return a point of the drawing in the world."""
         return np.asarray(np.add(point, self._offset))
@@ -94,16 +107,7 @@ class Scene:
     def _points(
         self, name: str, points: NDArray[np.float64], colours: NDArray[np.uint8], size: float, visible: bool
     ) -> None:
-        self._server.scene.add_point_cloud(
-            name,
-            (points - self._offset).astype(np.float32),
-            colours,
-            point_size=size,
-            point_shape="circle",
-            point_shading="flat",
-            precision="float32",
-            visible=visible,
-        )
+        add_points(self._server.scene, name, points - self._offset, colours, size, visible)
 
     def _cubes(
         self, name: str, centres: NDArray[np.float64], colours: NDArray[np.uint8], edge: float, visible: bool
@@ -127,47 +131,13 @@ class Scene:
         import trimesh
 
         drawn = trimesh.Trimesh(
-            mesh.vertices - self._offset, cut_mesh(mesh, state), vertex_colors=mesh.colours, process=False
+            mesh.vertices - self._offset,
+            cut_mesh(mesh, state),
+            vertex_normals=mesh.normals,
+            vertex_colors=linear(mesh.colours),
+            process=False,
         )
         self._server.scene.add_mesh_trimesh(f"/{MESH}", drawn, visible=MESH not in state.off)
-
-
-def start_server(host: str, port: int) -> viser.ViserServer:
-    """Start viser's server, at this port or not at all.
-
-    Raises
-    ------
-    InputError
-        Nothing can listen there.
-    MissingExtraError
-        The extra `view` is not installed.
-    """
-    try:
-        import viser
-    except ImportError as error:
-        raise MissingExtraError("the live viewer", "view") from error
-    try:  # viser itself would go on to the next port
-        with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((host, port))
-    except (OSError, OverflowError) as error:
-        problem = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot listen at {host}:{port}: {problem}. Give another --port or --host.") from error
-    with _silenced():
-        return viser.ViserServer(host=host, port=port, verbose=False)
-
-
-def stop_server(server: viser.ViserServer) -> None:
-    """Stop the server and its threads."""
-    with _silenced():
-        server.stop()
-
-
-@contextlib.contextmanager
-def _silenced() -> Iterator[None]:
-    """Keep viser from printing that it starts and stops."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        yield
 
 
 def _unit_cube() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:

@@ -12,24 +12,25 @@ from scipy.spatial import cKDTree
 from semgp.checks import require_finite
 from semgp.errors import InputError
 from semgp.maps.protocol import SemanticMap, SpatialMap
-from semgp.picture.coverage import spacing_of
-from semgp.voxels import voxel_keys, voxel_origin
+from semgp.picture.coverage import Discs, Planes, require_resolution, spacing_of, thinned
 
 F64 = NDArray[np.float64]
 
 _NEIGHBOURS = 32
-"""Data, itself included, whose plane a patch lies in."""
-_OVERLAP = 1.4
-"""Edge of a patch in spacings: patches of data that lie unevenly leave few gaps."""
+"""Data, itself included, whose plane a normal belongs to."""
 _SEERS = 12
 """Free places next to a datum, which tell the side from which it is seen."""
+_WITNESSES = 256
+"""Data that tell on which side of a wall the room lies, where no free space does."""
+_BEYOND = 0.2
+"""Share of the data that may lie behind a wall all the same."""
 
 
 class Surface:
     """The surface that a map's data lie on.
 
-    Coarser than the data, a point is the mean of a voxel's data. Finer, each datum stands for a square patch of
-    the plane through its neighbours: a GP says something between its data, too.
+    Coarser than the data, a point is the mean of a voxel's data. Finer, the data are covered with discs, as in
+    pictures, and the points on these are thinned out.
 
     Parameters
     ----------
@@ -60,11 +61,6 @@ class Surface:
             An empty map.
         """
         return cls(semantic_map.positions, free_positions(semantic_map))
-
-    @property
-    def oriented(self) -> bool:
-        """Whether the normals point to free space."""
-        return self.free is not None
 
     @cached_property
     def low(self) -> F64:
@@ -103,62 +99,78 @@ class Surface:
         InputError
             A resolution or number that is not positive.
         """
-        if not (math.isfinite(resolution) and resolution > 0):
-            raise InputError(f"the resolution must be a positive number of metres, not {resolution}.")
+        require_resolution(resolution)
         if most < 1:
             raise InputError(f"a view needs room for at least one point, not {most}.")
         while True:
-            across = math.ceil(_OVERLAP * self.spacing / resolution - 1e-9) if resolution < self.spacing else 1
-            if across == 1 or len(self.positions) * across**2 <= 4 * most:
-                points = _voxel_means(self._patches(across) if across > 1 else self.positions, resolution)
+            finer = resolution < self.spacing
+            if not finer or (self._discs.across(resolution).astype(float) ** 2).sum() <= 6 * most:
+                points = thinned(self._discs.points(resolution) if finer else self.positions, resolution)
                 if len(points) <= most:
                     return points, resolution
                 resolution *= max(1.0, 0.8 * math.sqrt(len(points) / most))
             resolution *= 1.15
 
-    def _patches(self, across: int) -> F64:
-        """Return `across` by `across` points of the patch around each datum."""
-        axes = self._principal[1]
-        steps = ((np.arange(across) + 0.5) / across - 0.5) * _OVERLAP * self.spacing
-        u, v = (a.ravel()[None, :, None] for a in np.meshgrid(steps, steps))
-        return np.asarray(
-            (self.positions[:, None] + u * axes[:, None, :, 1] + v * axes[:, None, :, 2]).reshape(-1, 3)
-        )
+    def sides(self, points: F64) -> tuple[F64, NDArray[np.bool_]]:
+        """Return where the surface faces at points on it, and whether it is seen from that side only.
 
-    def normals(self, points: F64) -> F64:
-        """Return the normal (M, 3) of the surface at points on it.
+        Where the map has free space, the surface faces it. Otherwise walls, floors and ceilings do: nearly all
+        data lie on one side of them, which is the room's.
 
-        Where the map has free space, they point to it. Else they point to either side, and are zero where no plane
-        fits: none fits the data of a line, such as a lidar's ring, or of a bush.
+        Parameters
+        ----------
+        points : (M, 3) array
+            Metres.
+
+        Returns
+        -------
+        normals : (M, 3) array
+            Of length one; zero where no plane fits: none fits the data of a line, such as a lidar's ring, or of a
+            bush.
+        one_sided : (M,) bool array
+            False where the normal could as well point the other way.
         """
-        return np.asarray(self._normals[self._tree.query(points)[1]])
+        nearest = cKDTree(self.positions).query(points)[1]
+        normals, one_sided = self._sides
+        return normals[nearest], one_sided[nearest]
 
     @cached_property
-    def _normals(self) -> F64:
-        """Normals (n, 3) of the data."""
-        spread, axes = self._principal
-        flat = (spread[:, 1] > 0.05 * spread[:, 2]) & (spread[:, 0] < 0.5 * spread[:, 1])
-        normals = np.where(flat[:, None], axes[:, :, 0], 0.0)
+    def _planes(self) -> Planes:
+        return Planes.through(self.positions, _NEIGHBOURS)
+
+    @cached_property
+    def _discs(self) -> Discs:
+        return Discs.of(self.positions, self._planes, self.spacing)
+
+    @cached_property
+    def _sides(self) -> tuple[F64, NDArray[np.bool_]]:
+        """Normals (n, 3) of the data, and whether they are seen from there only (n,)."""
+        planes = self._planes
+        flat = (planes.spread[:, 1] > 0.05 * planes.spread[:, 2]) & (
+            planes.spread[:, 0] < 0.5 * planes.spread[:, 1]
+        )
+        normals = np.where(flat[:, None], planes.axes[:, 0], 0.0)
         if self.free is None:
-            return normals
+            return self._facing_the_room(normals)
         around = self.free[cKDTree(self.free).query(self.positions, k=min(_SEERS, len(self.free)))[1]]
         outward = around.reshape(len(normals), -1, 3).mean(axis=1) - self.positions
         outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
         away = (normals * outward).sum(axis=1, keepdims=True) < 0
-        return np.where(flat[:, None], np.where(away, -normals, normals), outward)
+        return np.where(flat[:, None], np.where(away, -normals, normals), outward), np.ones(
+            len(normals), dtype=bool
+        )
 
-    @cached_property
-    def _principal(self) -> tuple[F64, F64]:
-        """Spread (n, 3), rising, and axes (n, 3, 3), in columns, of each datum's neighbours."""
-        k = min(_NEIGHBOURS, len(self.positions))
-        near = self.positions[self._tree.query(self.positions, k=k)[1].reshape(-1, k)]
-        apart = near - near.mean(axis=1, keepdims=True)
-        spread, axes = np.linalg.eigh(np.swapaxes(apart, 1, 2) @ apart)
-        return spread, axes
-
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.positions)
+    def _facing_the_room(self, normals: F64) -> tuple[F64, NDArray[np.bool_]]:
+        """Return normals turned to where most data lie, and whether hardly any lie on the other side."""
+        witnesses = self.positions[:: -(-len(self.positions) // _WITNESSES)]
+        before, behind = np.zeros((2, len(normals)), dtype=np.int64)
+        level = (normals * self.positions).sum(axis=1)
+        for witness in witnesses:
+            height = normals @ witness - level
+            before += height > 2 * self.spacing
+            behind += height < -2 * self.spacing
+        one_sided = np.minimum(before, behind) < _BEYOND * np.maximum(before, behind)
+        return np.where((behind > before)[:, None], -normals, normals), one_sided
 
 
 def free_positions(semantic_map: SemanticMap) -> F64 | None:
@@ -168,12 +180,3 @@ def free_positions(semantic_map: SemanticMap) -> F64 | None:
     assert isinstance(semantic_map, SpatialMap)
     free = semantic_map.free_positions
     return free if len(free) else None
-
-
-def _voxel_means(points: F64, resolution: float) -> F64:
-    """Return the mean of the points of each voxel, in the order of the voxels' keys."""
-    near = points - points[0]  # sums of small numbers: UTM coordinates keep their millimetres
-    keys = voxel_keys(near, resolution, voxel_origin(near, resolution))
-    _, place = np.unique(keys, return_inverse=True)
-    sums = np.stack([np.bincount(place, along) for along in near.T], axis=1)
-    return np.asarray(points[0] + sums / np.bincount(place)[:, None])
