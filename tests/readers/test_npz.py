@@ -1,7 +1,11 @@
 """npz files: what is written is read again, and what is wrong is said."""
 
+import gc
 import io
+import sys
 import zipfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +18,7 @@ from semgp.classes import Classes
 from semgp.cloud import LabelledCloud
 from semgp.errors import FileFormatError, InputError
 from semgp.readers import read, read_npz
+from semgp.readers.npz import read_npy
 from semgp.writers import write_npz
 
 CLASSES = Classes(("floor mat", "wall", "überall"), ((1, 2, 3), (4, 5, 6), (250, 251, 252)))
@@ -137,3 +142,38 @@ def test_write_npz_refuses(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="Python objects"):
         write_npz(tmp_path / "a.npz", cloud, thing=np.array([{}], dtype=object))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def hasty() -> Iterator[None]:
+    """Let threads take turns as often as can be, and collect garbage all the time."""
+    interval, thresholds = sys.getswitchinterval(), gc.get_threshold()
+    sys.setswitchinterval(1e-6)
+    gc.set_threshold(20)
+    yield
+    sys.setswitchinterval(interval)
+    gc.set_threshold(*thresholds)
+
+
+@pytest.mark.usefixtures("hasty")
+def test_many_threads_read_at_once() -> None:
+    class Garbage:
+        """Collected only as a cycle, by code that lets other threads in."""
+
+        def __init__(self) -> None:
+            self.itself = self
+
+        def __del__(self) -> None:
+            sum(range(20))
+
+    stream = io.BytesIO()
+    np.save(stream, np.arange(12.0).reshape(3, 4))
+
+    def read_often(_: int) -> int:
+        for _ in range(3000):
+            Garbage()
+            whole = read_npy(stream.getvalue())
+        return whole.size
+
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(read_often, range(8))) == 8 * [12]

@@ -62,8 +62,7 @@ def rows_of(semantic_map: SemanticMap, facts: Mapping[str, Any], place: Path) ->
     """Yield what there is to say, each line with its heading, given what the map's `info` returned."""
     yield "classes", _classes(semantic_map)
     yield "extent", _extent(semantic_map)
-    if (up := getattr(semantic_map, "up", None)) is not None:
-        yield "up", f"{up} axis"
+    yield "up", f"{semantic_map.up} axis"
     resolution = resolution_of(semantic_map) or facts.get("resolution")
     yield (
         "data",

@@ -30,6 +30,7 @@ import io
 import lzma
 import math
 import struct
+import threading
 import tokenize
 import zipfile
 import zlib
@@ -54,6 +55,8 @@ KINDS = {
     "up": "U",
 }
 """Kinds of numpy type that each array of the layout may have."""
+
+_PARSING = threading.Lock()  # Python 3.11's own parser, which reads headers, fails at times in several threads
 
 LARGEST_UNPACKED = 1 << 30
 """Bytes up to which any file is unpacked, however small it is."""
@@ -145,7 +148,8 @@ def read_npy(raw: bytes) -> NDArray[Any]:
     stream = io.BytesIO(raw)
     version = npy.read_magic(stream)
     read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-    shape, fortran_order, dtype = read_header(stream)
+    with _PARSING:
+        shape, fortran_order, dtype = read_header(stream)
     body = raw[stream.tell() :]
     if dtype.hasobject:
         raise ValueError("it holds Python objects, which are never read.")

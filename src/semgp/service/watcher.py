@@ -53,9 +53,7 @@ class Watcher:
         while not self._closing.wait(self._seconds):
             try:
                 self._look()
-            except (
-                Exception
-            ):  # whatever it is, such as a store that is away for a while, the next look may be better
+            except Exception:  # such as a store that is away for a while: the next look may be better
                 self._metrics.count("semgp_looks_total", result="failed")
             self._keeper.drop()
 
