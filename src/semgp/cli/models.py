@@ -29,7 +29,7 @@ def model_rows(model: BlockModel | GPModel, classes: Classes) -> Iterator[tuple[
     """Yield what a model is, each line with its heading."""
     if isinstance(model, BlockModel):
         yield "kernel", kernel_words(model.kernel, model.features)
-        yield "noise", f"variance {model.s_n:g} a label, and {model.nugget:g} a site however many labels it has"
+        yield "noise", f"variance {model.s_n:.3g} a label, and {model.nugget:.3g} a site however many labels it has"
         yield "posterior", _posterior(model)
         return
     kernels = [kernel_words(kernel) for kernel in model.kernels]
@@ -75,6 +75,6 @@ def _posterior(model: BlockModel) -> str:
     if model.posterior in EXPERTS:
         how = f"{model.posterior}, block by block"
     else:
-        powers = ", ".join(f"{name} {w:g}" for name, w in zip(PREDICTORS, model.powers, strict=True) if w > 0)
+        powers = ", ".join(f"{name} {w:.2g}" for name, w in zip(PREDICTORS, model.powers, strict=True) if w > 0)
         how = f"pool of predictors to their powers: {powers}"
     return f"{how}; blocks of at most {model.leaf} own sites, {model.near} near and {model.far} coarse ones"
