@@ -29,7 +29,10 @@ def model_rows(model: BlockModel | GPModel, classes: Classes) -> Iterator[tuple[
     """Yield what a model is, each line with its heading."""
     if isinstance(model, BlockModel):
         yield "kernel", kernel_words(model.kernel, model.features)
-        yield "noise", f"variance {model.s_n:.3g} a label, and {model.nugget:.3g} a site however many labels it has"
+        yield (
+            "noise",
+            f"variance {model.s_n:.3g} a label, and {model.nugget:.3g} a site however many labels it has",
+        )
         yield "posterior", _posterior(model)
         return
     kernels = [kernel_words(kernel) for kernel in model.kernels]
