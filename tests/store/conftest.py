@@ -37,3 +37,13 @@ def five(tmp_path: Path) -> MapStore:
         made.update(cloud(i, 3.0 * i))
         made.commit(f"cloud {i}")
     return MapStore(tmp_path / "map")
+
+
+@pytest.fixture
+def crowded(tmp_path: Path) -> MapStore:
+    """A map of five versions: empty, and of one to four clouds at the same place; see `scenes.crowd`."""
+    made = StoredMap.create(tmp_path / "map", PLAIN)
+    for i in range(4):
+        made.update(cloud(i, 1.0))
+        made.commit()
+    return MapStore(tmp_path / "map")

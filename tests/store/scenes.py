@@ -62,6 +62,11 @@ def in_memory(settings: Settings, *clouds: LabelledCloud) -> GPSemanticMap:
     return made
 
 
+def crowd(*seeds: int) -> Prediction:
+    """Return what a map of clouds at one place, as the fixture `crowded` has them, says of some points."""
+    return in_memory(PLAIN, *(cloud(seed, 1.0) for seed in seeds)).query(places(1))
+
+
 def stored(place: Path, *clouds: LabelledCloud, settings: Settings = PLAIN, most_sites: int = 10**6) -> StoredMap:
     """A committed map of some clouds, opened anew."""
     with StoredMap.create(place, settings) as made:

@@ -9,21 +9,7 @@ import pytest
 from semgp.errors import ConflictError, InputError
 from semgp.store import Manifest, MapStore, StoredMap
 from semgp.store.bucket import BucketFiles
-from tests.store.scenes import PLAIN, assert_same, cloud, in_memory, places
-
-
-@pytest.fixture
-def five(tmp_path: Path) -> MapStore:
-    """A map of five versions: empty, and of one to four clouds at the same place."""
-    made = StoredMap.create(tmp_path / "map", PLAIN)
-    for i in range(4):
-        made.update(cloud(i, 1.0))
-        made.commit()
-    return MapStore(tmp_path / "map")
-
-
-def wanted(*seeds: int) -> Any:
-    return in_memory(PLAIN, *(cloud(seed, 1.0) for seed in seeds)).query(places(1))
+from tests.store.scenes import PLAIN, assert_same, cloud, crowd, places
 
 
 def test_a_base_that_is_gone_from_a_bucket_cannot_be_merged(tmp_path: Path) -> None:
@@ -45,14 +31,14 @@ def test_a_base_that_is_gone_from_a_bucket_cannot_be_merged(tmp_path: Path) -> N
     assert list(store.check()) == []
 
 
-def test_a_merge_that_fails_half_way_adds_nothing_twice(five: MapStore) -> None:
-    mine = StoredMap(five)
+def test_a_merge_that_fails_half_way_adds_nothing_twice(crowded: MapStore) -> None:
+    mine = StoredMap(crowded)
     mine.update(cloud(9, 1.0))
     add, others = MapStore.add, [10, 11]
 
     def contested(store: MapStore, manifest: Manifest) -> None:
         if others and manifest.clouds > 4:
-            with StoredMap(five.location) as other, mock.patch.object(MapStore, "add", add):
+            with StoredMap(crowded.location) as other, mock.patch.object(MapStore, "add", add):
                 other.update(cloud(others.pop(0), 1.0))
                 other.commit()
             if not others:  # the second merge fails
@@ -75,5 +61,5 @@ def test_a_merge_that_fails_half_way_adds_nothing_twice(five: MapStore) -> None:
         mine.commit()
     assert mine.commit() == 8
     assert mine.clouds == 7
-    assert_same(mine.query(places(1)), wanted(0, 1, 2, 3, 9, 10, 11))
-    assert_same(StoredMap(five).query(places(1)), wanted(0, 1, 2, 3, 9, 10, 11))
+    assert_same(mine.query(places(1)), crowd(0, 1, 2, 3, 9, 10, 11))
+    assert_same(StoredMap(crowded).query(places(1)), crowd(0, 1, 2, 3, 9, 10, 11))
