@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 def topics(bag: Path, /) -> None:
     """List the topics of a robot log with types and counts, how long it is, and the frames of its tf.
 
-    What "semgp build" needs to be told: --topic is one of sensor_msgs/msg/PointCloud2.
+    What "semgp build" needs to be told: --topic is one of sensor_msgs/msg/PointCloud2. Or --depth and --labels are
+    two of sensor_msgs/msg/Image or CompressedImage, and --camera-info one of sensor_msgs/msg/CameraInfo.
 
     Example: semgp topics run.mcap
 
