@@ -132,7 +132,8 @@ def build(
         return
     free = FreeSpace() if free_space or half_life is not None else None
     forgetting = None if half_life is None else Forgetting(half_life)
-    classes, up = clouds[0].classes, up or clouds[0].up
+    first = clouds[0]
+    classes, up = first.classes, up or first.up
     with progress() as bars:
         semantic_map: SerialisableMap
         if kind != "gp":

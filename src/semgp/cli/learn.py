@@ -67,8 +67,9 @@ def learn(
     from semgp.writers import atomic_write
 
     with progress() as bars:
-        up = up or clouds[0].up
-        learned = learn_blocks(at_most(clouds, *SAMPLE), block_model(model, resolution, up), up, seed, bars)
+        sample = list(at_most(clouds, *SAMPLE))
+        up = up or sample[0].up
+        learned = learn_blocks(sample, block_model(model, resolution, up), up, seed, bars)
     with atomic_write(out) as temporary:
         temporary.write_text(json.dumps(learned.to_json(), indent=2) + "\n")
     report(

@@ -198,11 +198,12 @@ def _playback(scans: list[Path], inputs: AnyInputs, model: str, up: Up | None) -
     if model not in PRESETS:
         raise InputError(f"--model must be one of {', '.join(PRESETS)}, not {model!r}.")
     clouds = sources(scans, inputs)
-    classes = clouds[0].classes
+    first = clouds[0]
+    classes, upward = first.classes, up or first.up
 
     def begin() -> GPSemanticMap:
-        made = GPSemanticMap(classes, with_vertical(PRESETS[model], vertical(up or clouds[0].up)))
-        made.up = up or clouds[0].up
+        made = GPSemanticMap(classes, with_vertical(PRESETS[model], vertical(upward)))
+        made.up = upward
         return made
 
     return Playback(clouds, begin)

@@ -23,13 +23,12 @@ from semgp.evaluation.task import Result, Task
 from semgp.picture import View, by_class, by_value, colour_bar, disc_sizes, legend, panels, splat, stack, view_of
 from semgp.picture.image import Picture
 from semgp.prediction import Prediction
+from semgp.upward import direction
 
 MOST_BITS = 2.0
 """Entropy of the last colour, in bits: that of four classes equally likely."""
 FONT_SIZE = 29
 """Height of the letters in pixels, so that a row of five pictures can be read on a page."""
-UP_OPTICAL = (0.0, -1.0, 0.0)
-"""Upwards in the world of a level camera: y points down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +67,9 @@ def picture_figure(name: str, caption: str, picture: Picture) -> Figure:
     return Figure(name, caption, file.getvalue())
 
 
-def camera_view(truth: LabelledCloud, up: Sequence[float] = UP_OPTICAL, width: int = 640) -> View:
+def camera_view(truth: LabelledCloud, width: int = 640) -> View:
     """Return a view of a depth camera's frame, from a little above the camera."""
-    return view_of(truth.points, truth.origin, up=up, width=width, height=width * 3 // 4)
+    return view_of(truth.points, truth.origin, up=direction(truth.up), width=width, height=width * 3 // 4)
 
 
 def street_view(truth: LabelledCloud, width: int = 720) -> View:
